@@ -21,9 +21,13 @@
 //! unless named so; a lower distance is nearer, a higher similarity or confidence is more certain;
 //! ties break by lower index; every result is the same for any number of threads.
 
+#[cfg(feature = "cli")]
+pub mod cli;
 mod definition;
 mod descriptors;
 mod error;
+pub mod experiment;
+pub mod figure;
 mod ground_truth;
 mod map;
 pub mod metrics;
@@ -31,6 +35,7 @@ mod pose;
 mod ranking;
 mod retrieval;
 mod scores;
+pub mod table;
 
 pub use definition::Definition;
 pub use descriptors::Descriptors;
