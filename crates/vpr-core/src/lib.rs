@@ -21,12 +21,15 @@
 //! unless named so; a lower distance is nearer, a higher similarity or confidence is more certain;
 //! ties break by lower index; every result is the same for any number of threads.
 
+pub mod dataset;
 mod definition;
 mod descriptors;
 mod error;
 mod ground_truth;
 mod map;
 pub mod metrics;
+pub mod npy;
+pub mod pickle;
 mod pose;
 mod ranking;
 mod retrieval;
