@@ -23,6 +23,7 @@
 
 #[cfg(feature = "cli")]
 pub mod cli;
+pub mod dataset;
 mod definition;
 mod descriptors;
 mod error;
@@ -31,6 +32,8 @@ pub mod figure;
 mod ground_truth;
 mod map;
 pub mod metrics;
+pub mod npy;
+pub mod pickle;
 mod pose;
 mod ranking;
 mod retrieval;

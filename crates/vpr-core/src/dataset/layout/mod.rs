@@ -1,0 +1,3 @@
+//! One file per on-disk layout, read as the originals are.
+
+pub mod vpr_bench;
