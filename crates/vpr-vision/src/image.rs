@@ -80,7 +80,7 @@ pub fn probe(path: &Path) -> Result<ImageSize> {
 #[must_use]
 pub fn gray(image: &RgbImage) -> GrayImage {
     let (pixels, _) = image.as_slice().as_chunks();
-    from_pixels(image.size(), pixels.iter().map(luma).collect())
+    from_pixels(image.size(), pixels.iter().copied().map(luma).collect())
 }
 
 /// Bilinear resize without anti-aliasing, byte for byte OpenCV's `resize` with `INTER_LINEAR`.
@@ -112,7 +112,7 @@ fn from_pixels<const C: usize>(size: ImageSize, pixels: Vec<u8>) -> Image<u8, C>
     Image::new(size, pixels).expect("height × width × channels bytes")
 }
 
-fn luma(pixel: &[u8; 3]) -> u8 {
+fn luma(pixel: [u8; 3]) -> u8 {
     let [r, g, b] = pixel.map(u32::from);
     u8::try_from((4899 * r + 9617 * g + 1868 * b + 8192) >> 14).expect("the weights sum to one")
 }
