@@ -164,8 +164,7 @@ pub(super) fn descend(confidence: &[f64], correct: &[bool]) -> Result<Vec<Step>>
     ranked.sort_by(|a, b| (b.0 + 0.0).total_cmp(&(a.0 + 0.0)));
 
     let (mut true_positives, mut accepted) = (0, 0);
-    let equal = |a: &(f64, bool), b: &(f64, bool)| a.0.total_cmp(&b.0).is_eq() || a.0 == b.0;
-    let steps = ranked.chunk_by(equal).map(|tied| {
+    let steps = ranked.chunk_by(|a, b| a.0 == b.0).map(|tied| {
         true_positives += tied.iter().filter(|(_, correct)| *correct).count();
         accepted += tied.len();
         Step { threshold: tied[0].0, true_positives, accepted }
