@@ -93,6 +93,9 @@ pub struct Cell {
     /// Whether it differs from run to run (a timing): printed, but kept out of pages and checks.
     #[serde(skip)]
     pub volatile: bool,
+    /// Whether the note is one cell's own (an interval) and would only clutter a page's footnotes.
+    #[serde(skip)]
+    pub quiet: bool,
 }
 
 impl Cell {
@@ -115,6 +118,7 @@ impl Cell {
             n,
             note: None,
             volatile: false,
+            quiet: false,
         }
     }
 
@@ -144,6 +148,18 @@ impl Cell {
     #[must_use]
     pub fn noted(mut self, note: impl Into<String>) -> Self {
         self.note = Some(note.into());
+        self
+    }
+
+    /// Says how sure the value is, in the note; shown in CSV and JSON.
+    #[must_use]
+    pub fn within(mut self, low: f64, high: f64, method: &str) -> Self {
+        let interval = format!("95 % interval {low:.4} to {high:.4} ({method})");
+        self.quiet = self.note.is_none();
+        self.note = Some(match self.note {
+            Some(note) => format!("{note}; {interval}"),
+            None => interval,
+        });
         self
     }
 

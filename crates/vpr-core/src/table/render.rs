@@ -148,7 +148,7 @@ fn entry<'a>(table: &Table, cell: &'a Cell, notes: &mut Vec<&'a str>) -> String 
         Some(false) => " ✗",
         None => "",
     };
-    let note = cell.note.as_deref().map_or_else(String::new, |note| {
+    let note = cell.note.as_deref().filter(|_| !cell.quiet).map_or_else(String::new, |note| {
         let known = notes.iter().position(|it| *it == note);
         let index = known.unwrap_or_else(|| {
             notes.push(note);
