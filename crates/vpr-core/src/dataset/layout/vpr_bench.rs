@@ -6,6 +6,7 @@ mod matches;
 mod truth;
 
 pub use images::image_folder;
+pub(crate) use images::{image_number, is_image};
 pub use invariance::{read_areas, read_curves};
 pub use matches::PublishedMatches;
 pub use truth::GroundTruthFile;
