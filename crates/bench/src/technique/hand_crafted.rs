@@ -112,6 +112,15 @@ impl Features {
         self.len() == 0
     }
 
+    /// The vectors, if the technique has one per image.
+    #[must_use]
+    pub fn into_descriptors(self) -> Option<Descriptors> {
+        match self {
+            Self::Hog(descriptors) => Some(descriptors),
+            Self::CoHog(_) => None,
+        }
+    }
+
     /// Compares every query with every reference of the same technique.
     ///
     /// # Errors
