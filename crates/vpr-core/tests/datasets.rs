@@ -1,6 +1,14 @@
 //! Datasets of the manifest open as they are; broken ones say what is broken.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stderr,
+    clippy::float_cmp,
+    reason = "a test may, and numbers are read, not computed"
+)]
+
 use std::{
+    fmt::Write as _,
     fs,
     path::{Path, PathBuf},
 };
@@ -68,8 +76,9 @@ fn write_truth(path: &Path, rows: &[(i64, &[i64])]) {
         rows.len()
     );
     for (query, references) in rows {
-        let references: String = references.iter().map(|index| format!("I{index}\n")).collect();
-        pickle += &format!("I{query}\n({references}l");
+        write!(pickle, "I{query}\n(").unwrap();
+        references.iter().for_each(|index| writeln!(pickle, "I{index}").unwrap());
+        pickle.push('l');
     }
     pickle += "ltb.";
     let header =

@@ -1,5 +1,7 @@
 //! `.npy` and `.npz`: what NumPy writes is read, what is written NumPy could read, lies are refused.
 
+#![expect(clippy::unwrap_used, clippy::print_stderr, reason = "a test may")]
+
 use std::{
     fs,
     path::{Path, PathBuf},

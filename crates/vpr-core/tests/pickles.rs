@@ -1,5 +1,7 @@
 //! Pickles of every protocol decode to the same; hostile ones are refused, whatever they hold.
 
+#![expect(clippy::unwrap_used, reason = "a test may")]
+
 use std::{fmt::Write as _, path::Path};
 
 use proptest::prelude::*;
