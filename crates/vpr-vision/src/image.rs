@@ -76,7 +76,7 @@ pub fn probe(path: &Path) -> Result<ImageSize> {
     Ok(ImageSize { width: width as usize, height: height as usize })
 }
 
-/// Luma by ITU-R BT.601 in OpenCV's 14-bit fixed point: `(4899 R + 9617 G + 1868 B + 8192) >> 14`.
+/// Luma by ITU-R BT.601 in OpenCV's 15-bit fixed point: `(9798 R + 19235 G + 3735 B + 16384) >> 15`.
 #[must_use]
 pub fn gray(image: &RgbImage) -> GrayImage {
     let (pixels, _) = image.as_slice().as_chunks();
@@ -114,7 +114,7 @@ fn from_pixels<const C: usize>(size: ImageSize, pixels: Vec<u8>) -> Image<u8, C>
 
 fn luma(pixel: [u8; 3]) -> u8 {
     let [r, g, b] = pixel.map(u32::from);
-    u8::try_from((4899 * r + 9617 * g + 1868 * b + 8192) >> 14).expect("the weights sum to one")
+    u8::try_from((9798 * r + 19235 * g + 3735 * b + 16384) >> 15).expect("the weights sum to one")
 }
 
 fn read(path: &Path) -> Result<Vec<u8>> {

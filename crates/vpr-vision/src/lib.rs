@@ -1,3 +1,4 @@
 //! Images and hand-crafted vision for visual place recognition.
 
+pub mod cohog;
 pub mod image;
