@@ -1,5 +1,11 @@
 //! CoHOG on the images of the Corridor dataset, where the shared data is at hand.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stderr,
+    reason = "a test may panic, and says why it does not run"
+)]
+
 use std::{env, fs, path::Path};
 
 use vpr_core::{GroundTruth, Result, metrics};

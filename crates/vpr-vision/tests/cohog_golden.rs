@@ -1,5 +1,7 @@
 //! CoHOG against the released code, on one generated image (`data/golden/cohog/README.md`).
 
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::{fs, path::PathBuf};
 
 use vpr_vision::cohog::{CoHog, CoHogParams, local_entropy};

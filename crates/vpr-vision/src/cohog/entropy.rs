@@ -102,7 +102,6 @@ impl Histogram {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use super::*;
     use crate::image::ImageSize;

@@ -83,7 +83,6 @@ fn mean_best_match(query: &QueryPanels, reference: &ReferenceGroups) -> f64 {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "these values are exact")]
 mod tests {
     use rayon::ThreadPoolBuilder;
 
@@ -155,7 +154,7 @@ mod tests {
         assert!(matches!(similarity(&small, &large), Err(Error::Mismatch { .. })));
         let other = place(1, 4, 36, 2);
         assert!(matches!(similarities(&[other], &[small]), Err(Error::Mismatch { .. })));
-        assert!(matches!(similarities(&[], &[large.clone()]), Err(Error::Empty(_))));
+        assert!(matches!(similarities(&[], std::slice::from_ref(&large)), Err(Error::Empty(_))));
         assert!(matches!(similarities(&[large], &[]), Err(Error::Empty(_))));
     }
 
@@ -163,7 +162,7 @@ mod tests {
     fn an_overflow_is_an_error() {
         let huge =
             CoHogDescriptor::new(Array2::from_elem((4, 32), f32::MAX), vec![true; 4]).unwrap();
-        let result = similarities(&[huge.clone()], &[huge]);
+        let result = similarities(std::slice::from_ref(&huge), std::slice::from_ref(&huge));
         assert!(matches!(result, Err(Error::NotFinite { .. })));
     }
 }
