@@ -29,8 +29,8 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<Outcome> {
             image::probe(path)
         };
         let size = size.map_err(|err| without_path(&err))?;
-        let side = |pixels: usize| u32::try_from(pixels).map_err(|err| err.to_string());
-        Ok((side(size.width)?, side(size.height)?))
+        let length = |pixels: usize| u32::try_from(pixels).map_err(|err| err.to_string());
+        Ok((length(size.width)?, length(size.height)?))
     };
     let problems = validate(&args.folder, &probe);
     for problem in &problems {

@@ -75,6 +75,19 @@ impl CoHogParams {
     pub fn with_cell_size(cell_size: usize) -> Self {
         Self { cell_size, ..Self::default() }
     }
+
+    /// Number of regions of one image: two cells wide and high, one cell apart.
+    #[must_use]
+    pub const fn n_regions(&self) -> usize {
+        let per_side = (self.image_size / self.cell_size).saturating_sub(1);
+        per_side * per_side
+    }
+
+    /// Length of one region's descriptor: the histograms of its four cells.
+    #[must_use]
+    pub const fn depth(&self) -> usize {
+        4 * self.bins
+    }
 }
 
 /// Describes images by the gradient orientations of overlapping regions.

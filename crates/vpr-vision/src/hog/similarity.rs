@@ -37,7 +37,8 @@ pub fn similarities(queries: &Descriptors, references: &Descriptors) -> Result<S
         it.view().outer_iter().map(|it| dot(it, it).sqrt()).collect()
     };
     let (query_lengths, reference_lengths) = (lengths(queries), lengths(references));
-    let batches: Vec<_> = queries.view().axis_chunks_iter(Axis(0), BATCH).collect();
+    let rows = queries.view();
+    let batches: Vec<_> = rows.axis_chunks_iter(Axis(0), BATCH).collect();
     let batches: Vec<_> =
         batches.into_par_iter().map(|queries| products(queries, references.view())).collect();
     let batches: Vec<_> = batches.iter().map(|it| it.view()).collect();
