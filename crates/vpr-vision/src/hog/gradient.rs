@@ -112,7 +112,6 @@ struct HalfTurn<S: Simd> {
 }
 
 impl<S: Simd> HalfTurn<S> {
-    #[expect(clippy::inline_always, reason = "takes the instruction set of the caller")]
     #[inline(always)]
     fn new(simd: S, bins: f32) -> Self {
         const ODD: [f32; 4] = [0.999_787_84, -0.325_808_4, 0.155_578_65, -0.044_326_555];
@@ -130,7 +129,7 @@ impl<S: Simd> HalfTurn<S> {
         let zero = simd.splat_f32s(0.0);
         let x = simd.max_f32s(dx, simd.sub_f32s(zero, dx));
         let y = simd.max_f32s(dy, simd.sub_f32s(zero, dy));
-        let tiny = simd.splat_f32s(f64::EPSILON as f32);
+        let tiny = simd.splat_f32s(2.220_446e-16); // no division by zero; the size is OpenCV's
         let tangent = simd.div_f32s(simd.min_f32s(x, y), simd.add_f32s(simd.max_f32s(x, y), tiny));
         let square = simd.mul_f32s(tangent, tangent);
         let [first, third, fifth, seventh] = self.arc_tangent;

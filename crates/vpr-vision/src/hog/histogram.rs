@@ -13,6 +13,7 @@ const CLIP: f32 = 0.2;
 /// What a pixel counts for each cell of its block: Gaussian × tent, for one axis, one padded row for each cell.
 ///
 /// Both are separable, so the weight of a pixel is the product of two of these.
+#[expect(clippy::cast_possible_truncation, reason = "weights are from 0 to 1, kept in f32")]
 pub(super) fn weights(params: &HogParams) -> Vec<f32> {
     let &HogParams { block, cell, .. } = params;
     let sigma = block as f64 / 4.0;
@@ -116,7 +117,7 @@ fn vote<S: Simd>(simd: S, gradients: [&[f32]; 2], bin: usize, bins: usize, votes
 #[expect(clippy::inline_always, reason = "takes the instruction set of the caller")]
 #[inline(always)]
 fn add<S: Simd>(simd: S, weights: [f32; BAND], votes: &[f32], column: &mut [f32]) {
-    if weights == [0.0; BAND] {
+    if weights.iter().all(|&it| it == 0.0) {
         return;
     }
     let weights = weights.map(|it| simd.splat_f32s(it));
@@ -172,7 +173,11 @@ fn sum_along_x<S: Simd>(
 fn normalise(block: &mut [f32]) {
     let length = |block: &[f32]| block.iter().map(|it| it * it).sum::<f32>().sqrt();
     let scale = 1.0 / (length(block) + 0.1 * block.len() as f32);
-    block.iter_mut().for_each(|it| *it = (*it * scale).min(CLIP));
+    for it in &mut *block {
+        *it = (*it * scale).min(CLIP);
+    }
     let scale = 1.0 / (length(block) + 1e-3);
-    block.iter_mut().for_each(|it| *it *= scale);
+    for it in block {
+        *it *= scale;
+    }
 }

@@ -63,9 +63,10 @@ impl Hog {
     /// [`vpr_core::Error::Parameter`] if the image has no pixels.
     pub fn describe<const C: usize>(&self, image: &Image<u8, C>) -> Result<Vec<f32>> {
         let size = ImageSize { width: self.params.window, height: self.params.window };
-        let image = match image.size() == size {
-            true => Cow::Borrowed(image),
-            false => Cow::Owned(resize_bilinear(image, size)?),
+        let image = if image.size() == size {
+            Cow::Borrowed(image)
+        } else {
+            Cow::Owned(resize_bilinear(image, size)?)
         };
         let (pixels, _) = image.as_slice().as_chunks::<C>();
         Ok(Arch::new().dispatch(Describe { hog: self, pixels }))
@@ -93,15 +94,16 @@ mod tests {
     use super::*;
     use crate::image::GrayImage;
 
-    fn gray(width: usize, pixel: impl Fn(usize, usize) -> u8) -> GrayImage {
-        let pixels = (0..width * width).map(|at| pixel(at % width, at / width)).collect();
+    fn gray(width: usize, pixel: impl Fn(usize, usize) -> usize) -> GrayImage {
+        let pixel = |at: usize| u8::try_from(pixel(at % width, at / width)).unwrap();
+        let pixels = (0..width * width).map(pixel).collect();
         GrayImage::new(ImageSize { width, height: width }, pixels).unwrap()
     }
 
     #[test]
     fn every_configuration_has_its_published_length() {
         let dim = |params: HogParams| {
-            let image = gray(64, |x, y| (x * 7 + y * 3) as u8);
+            let image = gray(64, |x, y| (x * 7 + y * 3) % 256);
             let descriptor = Hog::new(params).unwrap().describe(&image).unwrap();
             assert_eq!(descriptor.len(), params.dim());
             params.dim()
@@ -124,29 +126,29 @@ mod tests {
     #[test]
     fn horizontal_ramp_votes_equally_for_first_and_last_bin() {
         let params = HogParams { window: 8, block: 8, stride: 8, cell: 8, bins: 9 };
-        let descriptor = Hog::new(params).unwrap().describe(&gray(8, |x, _| 10 * x as u8)).unwrap();
+        let descriptor = Hog::new(params).unwrap().describe(&gray(8, |x, _| 10 * x)).unwrap();
         assert!((descriptor[0] - descriptor[8]).abs() < 1e-6);
         assert!(descriptor[1..8].iter().all(|&it| it == 0.0), "{descriptor:?}");
-        let half = 0.2 / (2.0 * 0.2f32.powi(2)).sqrt().mul_add(1.0, 1e-3);
+        let half = 0.2 / ((2.0 * 0.2_f32.powi(2)).sqrt() + 1e-3);
         assert!((descriptor[0] - half).abs() < 1e-6, "{} {half}", descriptor[0]);
     }
 
-    /// Direction 45° is 2¼ bins, which is 1¾ bin centres: one quarter for bin 1, three for bin 2.
+    /// Inside, the direction is 45°: 2¼ bins, between the centres of bins 1 and 2. At the border one axis has no
+    /// gradient, so the direction is 0° (bins 8 and 0) or 90° (bin 4).
     #[test]
-    fn diagonal_ramp_is_shared_between_two_bins() {
+    fn diagonal_ramp_votes_between_two_bins_and_for_its_border() {
         let params = HogParams { window: 4, block: 4, stride: 4, cell: 4, bins: 9 };
-        let ramp = gray(4, |x, y| 2 * (x + y) as u8);
-        let hog = Hog::new(params).unwrap();
-        let descriptor = hog.describe(&ramp).unwrap();
-        assert!(descriptor[2] > descriptor[1] && descriptor[1] > 0.0, "{descriptor:?}");
-        assert!(descriptor[3..8].iter().all(|&it| it == 0.0), "{descriptor:?}");
+        let ramp = gray(4, |x, y| 2 * (x + y));
+        let descriptor = Hog::new(params).unwrap().describe(&ramp).unwrap();
+        let voted: Vec<usize> = (0..9).filter(|&bin| descriptor[bin] > 0.0).collect();
+        assert_eq!(voted, [0, 1, 2, 4, 8], "{descriptor:?}");
     }
 
     #[test]
     fn strongest_channel_counts() {
         let params = HogParams { window: 16, block: 16, stride: 8, cell: 8, bins: 9 };
         let hog = Hog::new(params).unwrap();
-        let strong = gray(16, |x, y| ((x * x + 3 * y) % 256) as u8);
+        let strong = gray(16, |x, y| (x * x + 3 * y) % 256);
         for channel in 0..3 {
             let pixels = strong.as_slice().iter().flat_map(|&value| {
                 let mut pixel = [7, 7, 7];
@@ -180,7 +182,7 @@ mod tests {
     #[test]
     fn odd_sizes_agree_with_the_definition() {
         let params = HogParams { window: 45, block: 15, stride: 10, cell: 5, bins: 7 };
-        let image = gray(45, |x, y| ((x * 31 + y * 17 + x * y) % 256) as u8);
+        let image = gray(45, |x, y| (x * 31 + y * 17 + x * y) % 256);
         let fast = Hog::new(params).unwrap().describe(&image).unwrap();
         let slow = definition(&params, &image);
         let worst = fast.iter().zip(&slow).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
@@ -188,14 +190,18 @@ mod tests {
     }
 
     /// Pixel by pixel, with the exact arc tangent.
+    #[expect(clippy::cast_possible_truncation, reason = "descriptors are f32, bins are few")]
+    #[expect(clippy::cast_sign_loss, reason = "bins are not negative")]
     fn definition(params: &HogParams, image: &GrayImage) -> Vec<f32> {
         let &HogParams { window, block, stride, cell, bins } = params;
-        let mirrored = |at: isize| -> usize {
-            let last = window as isize - 1;
-            (last - (last - at.abs()).abs()) as usize
+        // coordinates are one more than those of the image, so that the border is not negative
+        let mirrored = |at: usize| match at {
+            0 => 1,
+            _ if at > window => window - 2,
+            _ => at - 1,
         };
         let pixel =
-            |x: isize, y: isize| f64::from(image.as_slice()[mirrored(y) * window + mirrored(x)]);
+            |x: usize, y: usize| f64::from(image.as_slice()[mirrored(y) * window + mirrored(x)]);
         let (cells, blocks) = (block / cell, (window - block) / stride + 1);
         let mut descriptor = Vec::new();
         for (left, top) in
@@ -203,7 +209,7 @@ mod tests {
         {
             let mut histograms = vec![0.0; cells * cells * bins];
             for (j, i) in (0..block * block).map(|at| (at % block, at / block)) {
-                let (x, y) = ((left + j) as isize, (top + i) as isize);
+                let (x, y) = (left + j + 1, top + i + 1);
                 let (dx, dy) =
                     (pixel(x + 1, y) - pixel(x - 1, y), pixel(x, y + 1) - pixel(x, y - 1));
                 let turn = dy.atan2(dx).rem_euclid(std::f64::consts::PI) / std::f64::consts::PI;
@@ -226,7 +232,9 @@ mod tests {
             }
             let length = |it: &[f64]| it.iter().map(|it| it * it).sum::<f64>().sqrt();
             let scale = length(&histograms) + 0.1 * histograms.len() as f64;
-            histograms.iter_mut().for_each(|it| *it = (*it / scale).min(0.2));
+            for it in &mut histograms {
+                *it = (*it / scale).min(0.2);
+            }
             let scale = length(&histograms) + 1e-3;
             descriptor.extend(histograms.iter().map(|it| (it / scale) as f32));
         }

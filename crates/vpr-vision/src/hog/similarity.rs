@@ -1,6 +1,6 @@
 //! Cosine similarity of descriptors, as VPR-Bench scores HOG.
 
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, concatenate, s};
+use ndarray::{Array1, Array2, ArrayView1, ArrayView2, ArrayViewMut2, Axis, s};
 use rayon::prelude::*;
 use vpr_core::{Descriptors, Error, Result, Similarities};
 
@@ -37,26 +37,29 @@ pub fn similarities(queries: &Descriptors, references: &Descriptors) -> Result<S
         it.view().outer_iter().map(|it| dot(it, it).sqrt()).collect()
     };
     let (query_lengths, reference_lengths) = (lengths(queries), lengths(references));
-    let rows = queries.view();
-    let batches: Vec<_> = rows.axis_chunks_iter(Axis(0), BATCH).collect();
-    let batches: Vec<_> =
-        batches.into_par_iter().map(|queries| products(queries, references.view())).collect();
-    let batches: Vec<_> = batches.iter().map(|it| it.view()).collect();
-    let mut cosines = concatenate(Axis(0), &batches).expect("batches are equally wide");
+    let mut cosines = Array2::zeros((queries.len(), references.len()));
+    cosines
+        .axis_chunks_iter_mut(Axis(0), BATCH)
+        .into_par_iter()
+        .zip(queries.view().axis_chunks_iter(Axis(0), BATCH))
+        .for_each(|(sums, queries)| add_products(queries, references.view(), sums));
     for (mut row, &query) in cosines.outer_iter_mut().zip(&query_lengths) {
         row.zip_mut_with(&reference_lengths, |it, &reference| *it = cosine(*it, query, reference));
     }
     Similarities::new(cosines)
 }
 
-fn products(queries: ArrayView2<f32>, references: ArrayView2<f32>) -> Array2<f64> {
-    let mut sums = Array2::zeros((queries.nrows(), references.nrows()));
+/// Adds the scalar product of every query with every reference to `queries × references` sums.
+fn add_products(
+    queries: ArrayView2<f32>,
+    references: ArrayView2<f32>,
+    mut sums: ArrayViewMut2<f64>,
+) {
     for start in (0..queries.ncols()).step_by(RUN) {
         let run = s![.., start..(start + RUN).min(queries.ncols())];
         let products = queries.slice(run).dot(&references.slice(run).t());
         sums.zip_mut_with(&products, |sum, &product| *sum += f64::from(product));
     }
-    sums
 }
 
 fn dot(a: ArrayView1<f32>, b: ArrayView1<f32>) -> f64 {
