@@ -1,5 +1,7 @@
 //! The program as a user meets it: output, exit codes, and what it says about wrong input.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::{
     fs,
     path::{Path, PathBuf},

@@ -3,18 +3,25 @@
 //! Oracle: `data/golden/metrics/vprbench_oracle.csv`, six decimals, hence the tolerance of 1e-6. Runs
 //! where `VPR_DATA` names a folder with VPR-Bench's files; says `skipped:` otherwise.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test fails by panicking and says what it skips"
+)]
+
 use std::path::{Path, PathBuf};
 
 use bench::{
-    data::Data,
+    data::{Data, Stored},
     evaluate::{Evaluation, Positives},
-    technique::Technique,
+    technique::{HandCrafted, Technique},
 };
 use vpr_core::{
-    Definition,
+    Definition, Similarities,
     dataset::layout::vpr_bench::{read_areas, read_curves},
     metrics,
 };
+use vpr_vision::{cohog::CoHogParams, hog::HogParams};
 
 const TOLERANCE: f64 = 1e-6;
 
@@ -120,4 +127,65 @@ fn areas_between_the_published_curves_are_the_stored_ones() {
         }
     }
     assert_eq!(n_curves, 16);
+}
+
+/// Our scores of a technique on Corridor's images, and the stored ones.
+fn corridor(data: &Data, technique: Technique, ours: &HandCrafted) -> (Similarities, Stored) {
+    let stored = data.stored("corridor", technique).unwrap().expect("published matches at hand");
+    let images = data.images("corridor").unwrap().expect("images at hand");
+    let queries = ours.encode(&images.queries, &|| ()).unwrap();
+    let references = ours.encode(&images.references, &|| ()).unwrap();
+    (queries.match_with(&references).unwrap().similarities, stored)
+}
+
+/// Mean and largest absolute difference of two score matrices.
+fn difference(ours: &Similarities, stored: &Stored) -> (f64, f64) {
+    let apart: Vec<f64> =
+        ours.view().iter().zip(stored.similarities.view()).map(|(a, b)| (a - b).abs()).collect();
+    let largest = apart.iter().copied().fold(0.0, f64::max);
+    (apart.iter().sum::<f64>() / apart.len() as f64, largest)
+}
+
+fn recall_at_1(similarities: &Similarities, stored: &Stored) -> f64 {
+    Evaluation::new(similarities, &stored.truth).unwrap().recall_at(1).unwrap()
+}
+
+/// Share of queries whose best reference is the stored one.
+fn same_best(similarities: &Similarities, stored: &Stored) -> f64 {
+    let best = similarities.best().reference;
+    let same = best.iter().zip(&stored.best.reference).filter(|(a, b)| a == b).count();
+    same as f64 / best.len() as f64
+}
+
+/// OpenCV itself differs from the published matrix by .0023 on average: other image decoders.
+#[test]
+fn hog_in_the_released_configuration_gives_the_published_scores() {
+    let Some(data) = data() else { return };
+    let hog = HandCrafted::Hog(HogParams::RELEASED);
+    let (ours, stored) = corridor(&data, Technique::Hog, &hog);
+    let (mean, largest) = difference(&ours, &stored);
+    println!(
+        "HOG on Corridor: mean difference {mean:.5}, largest {largest:.5}, same best {:.3}, R@1 {:.4}",
+        same_best(&ours, &stored),
+        recall_at_1(&ours, &stored)
+    );
+    assert!(mean <= 0.003, "{mean}");
+    let (thesis, _) = corridor(&data, Technique::Hog, &HandCrafted::Hog(HogParams::THESIS));
+    assert!(difference(&thesis, &stored).0 > 0.03, "the thesis' configuration is another one");
+}
+
+#[test]
+fn cohog_recalls_as_published() {
+    let Some(data) = data() else { return };
+    let cohog = HandCrafted::CoHog(CoHogParams::default());
+    let (ours, stored) = corridor(&data, Technique::CoHog, &cohog);
+    let (mean, largest) = difference(&ours, &stored);
+    let (recall, published) =
+        (recall_at_1(&ours, &stored), recall_at_1(&stored.similarities, &stored));
+    println!(
+        "CoHOG on Corridor: mean difference {mean:.6}, largest {largest:.5}, same best {:.3}, R@1 {recall:.4}",
+        same_best(&ours, &stored)
+    );
+    assert!((published - 0.622).abs() < 5e-4, "{published}");
+    assert!((recall - published).abs() <= 0.05, "{recall}");
 }

@@ -65,7 +65,7 @@ fn committed_image_is_described_as_by_opencv() {
 #[test]
 fn shared_images_are_described_as_by_opencv() {
     let Some(data) = env::var_os("VPR_DATA") else {
-        println!("VPR_DATA is not set: the shared golden files are not compared");
+        println!("skipped: VPR_DATA is not set, the shared golden files are not compared");
         return;
     };
     let data = Path::new(&data);
