@@ -25,7 +25,7 @@ mod definition;
 mod descriptors;
 mod error;
 mod ground_truth;
-mod map;
+pub mod map;
 pub mod metrics;
 mod pose;
 mod ranking;

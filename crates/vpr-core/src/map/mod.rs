@@ -1,4 +1,26 @@
-//! The reference map: descriptors with poses.
+//! The reference map: descriptors with poses, in memory and on disk.
+
+mod about;
+mod access;
+mod checks;
+mod digest;
+mod file;
+mod header;
+mod layout;
+mod names;
+mod replace;
+mod row_type;
+mod touch;
+mod writer;
+
+pub use about::{About, Coordinates, ImageSize, UtmZone};
+pub use digest::{BlockDigest, image_list_digest};
+pub use file::{Access, MapFile, Opening};
+pub use header::{ElementType, Header, TensorEntry};
+pub use names::Names;
+pub use replace::{NewFile, replace};
+pub use row_type::RowType;
+pub use writer::{MapWriter, write};
 
 use crate::{Descriptors, Error, Poses, Result};
 

@@ -1,0 +1,334 @@
+//! A map file that is open: checked, mapped, its rows read as they are needed.
+
+use std::{
+    fs::File,
+    ops::Range,
+    path::{Path, PathBuf},
+    sync::OnceLock,
+};
+
+use memmap2::Mmap;
+use nalgebra::{Isometry3, Point2, Point3, Quaternion, Translation3, UnitQuaternion};
+use ndarray::Array2;
+
+use super::{
+    About, BlockDigest, Map, Names, RowType, access, checks,
+    header::Header,
+    layout::{self, Rows},
+    touch::{Touched, check_rows},
+};
+use crate::{Descriptors, Error, Poses, Result};
+
+/// How the descriptors of an open map are reached.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Access {
+    /// Through a memory map: rows of f32 are used in place, without a copy. Pages that were looked
+    /// at count as memory of the process until the system needs them for something else.
+    #[default]
+    Mapped,
+    /// Through reads into a buffer: memory stays at the size of the buffers, at one copy per scan.
+    Read,
+}
+
+/// How to open a map.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Opening {
+    /// How descriptors are reached.
+    pub access: Access,
+    /// Skips the check of digests and finiteness when a block is first touched.
+    pub trust: bool,
+}
+
+/// One map file, open for reading.
+///
+/// Opening reads the header and the table of digests, nothing else. The digest and the finiteness
+/// of descriptors are checked when a block of them (1 MiB) is first touched, unless trusted; those
+/// of poses and names when they are read. The file may be replaced meanwhile: an open map stays
+/// what it was.
+#[derive(Debug)]
+pub struct MapFile {
+    path: PathBuf,
+    file: File,
+    map: Option<Mmap>,
+    header: Header,
+    about: About,
+    rows: Rows,
+    digests: Vec<u8>,
+    touched: Touched,
+    scales: OnceLock<Vec<f32>>,
+}
+
+impl MapFile {
+    /// Opens a map: memory-mapped, and checked where it is touched.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] if the file cannot be read, [`Error::Format`] if it is no map or damaged.
+    pub fn open(path: &Path) -> Result<Self> {
+        Self::open_with(path, Opening::default())
+    }
+
+    /// Opens a map in a given way.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::open`].
+    pub fn open_with(path: &Path, opening: Opening) -> Result<Self> {
+        let file = File::open(path).map_err(Error::io(path))?;
+        let (header, json) = Header::read(path, &file)?;
+        checks::check_header(path, &header, &json)?;
+        let rows = Rows::of(path, &header)?;
+        checks::check_tensors(path, &header, &rows)?;
+        let about = About::read_from(&header.metadata)
+            .map_err(|(place, reason)| Error::format(path, place, reason))?;
+        let digests = checks::read_tensor(path, &file, &header, layout::DIGESTS)?;
+        checks::check_digests(path, &header, &rows, &digests)?;
+        let map = match opening.access {
+            Access::Mapped => Some(access::map(&file).map_err(Error::io(path))?),
+            Access::Read => None,
+        };
+        let touched = if opening.trust { Touched::all() } else { Touched::none(rows.n_blocks()) };
+        let path = path.to_owned();
+        let scales = OnceLock::new();
+        Ok(Self { path, file, map, header, about, rows, digests, touched, scales })
+    }
+
+    /// The file, as it was named when it was opened.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What the map says about itself.
+    #[must_use]
+    pub fn about(&self) -> &About {
+        &self.about
+    }
+
+    /// Number of references.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.rows.len
+    }
+
+    /// Whether there is no reference.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows.len == 0
+    }
+
+    /// Length of one descriptor.
+    #[must_use]
+    pub fn dim(&self) -> usize {
+        self.rows.dim
+    }
+
+    /// How descriptors are stored.
+    #[must_use]
+    pub fn row_type(&self) -> RowType {
+        self.rows.row_type
+    }
+
+    /// Everything the file's header says, for people who want to see it.
+    #[must_use]
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Copies the descriptors from row `start` on into `values`, a whole number of rows.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] if there are not so many rows, [`Error::Format`] if a block that is
+    /// touched for the first time is damaged, [`Error::NotFinite`] if it holds a NaN.
+    ///
+    /// # Panics
+    ///
+    /// If the length of `values` is no multiple of [`Self::dim`].
+    pub fn read_rows(&self, start: usize, values: &mut [f32]) -> Result<()> {
+        let dim = self.rows.dim;
+        assert!(values.len().is_multiple_of(dim), "whole rows are read");
+        let rows = self.check_range(start..start + values.len() / dim)?;
+        self.touch(&rows)?;
+        let scales = self.scales()?;
+        let scale = |row: usize| scales.get(row).copied().unwrap_or(1.0);
+        let row_bytes = self.rows.row_bytes();
+        let decode = |bytes: &[u8], values: &mut [f32]| {
+            let stored = bytes.chunks_exact(row_bytes).zip(values.chunks_exact_mut(dim));
+            for (row, (bytes, values)) in rows.clone().zip(stored) {
+                self.rows.row_type.decode(bytes, scale(row), values);
+            }
+        };
+        if let Some(bytes) = self.mapped(&self.rows.bytes_of(&rows)) {
+            decode(bytes, values);
+        } else if self.rows.row_type == RowType::F32 && cfg!(target_endian = "little") {
+            self.read_at(bytemuck::cast_slice_mut(values), self.rows.bytes_of(&rows).start)?;
+        } else {
+            decode(&self.read_bytes(&self.rows.bytes_of(&rows))?, values);
+        }
+        Ok(())
+    }
+
+    /// The descriptors of these rows in place, if they are memory-mapped and stored as f32.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::read_rows`].
+    pub fn rows_in_place(&self, rows: Range<usize>) -> Result<Option<&[f32]>> {
+        let rows = self.check_range(rows)?;
+        self.touch(&rows)?;
+        if self.rows.row_type != RowType::F32 || cfg!(target_endian = "big") {
+            return Ok(None);
+        }
+        let bytes = self.mapped(&self.rows.bytes_of(&rows));
+        Ok(bytes.and_then(|bytes| bytemuck::try_cast_slice(bytes).ok()))
+    }
+
+    /// All descriptors, in memory.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::read_rows`].
+    pub fn descriptors(&self) -> Result<Descriptors> {
+        let mut rows = Array2::zeros((self.rows.len, self.rows.dim));
+        self.read_rows(0, rows.as_slice_mut().unwrap_or_default())?;
+        Descriptors::new(rows)
+    }
+
+    /// The poses, if the map has any.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] if they are damaged, [`Error::NotFinite`] if one is not finite.
+    pub fn poses(&self) -> Result<Option<Poses>> {
+        let Some(entry) = self.header.tensors.get(layout::POSITIONS) else { return Ok(None) };
+        let positions = doubles(&self.read_tensor(layout::POSITIONS)?);
+        let poses = if entry.shape[1] == 2 {
+            Poses::Planar(positions.as_chunks().0.iter().map(|&[x, y]| Point2::new(x, y)).collect())
+        } else if self.header.tensors.contains_key(layout::ORIENTATIONS) {
+            let orientations = doubles(&self.read_tensor(layout::ORIENTATIONS)?);
+            let both = positions.as_chunks().0.iter().zip(orientations.as_chunks().0);
+            Poses::SixDof(both.map(|(position, wxyz)| pose(*position, *wxyz)).collect())
+        } else {
+            Poses::Spatial(positions.as_chunks().0.iter().map(|&xyz| Point3::from(xyz)).collect())
+        };
+        poses.check_finite()?;
+        Ok(Some(poses))
+    }
+
+    /// The names of the images, if the map has them.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] if they are damaged.
+    pub fn names(&self) -> Result<Option<Names>> {
+        if !self.header.tensors.contains_key(layout::NAMES) {
+            return Ok(None);
+        }
+        let offsets = self.read_tensor(layout::NAME_OFFSETS)?;
+        let offsets: Vec<i64> =
+            offsets.as_chunks().0.iter().map(|bytes| i64::from_le_bytes(*bytes)).collect();
+        let names = Names::from_parts(self.read_tensor(layout::NAMES)?, &offsets)
+            .map_err(|reason| Error::format(&self.path, "tensor `names`", reason))?;
+        Ok(Some(names))
+    }
+
+    /// The whole map in memory.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::PoseKind`] if the map has no poses, and those of [`Self::descriptors`] and
+    /// [`Self::poses`].
+    pub fn to_map(&self) -> Result<Map> {
+        let none = Error::PoseKind { needed: "any kind of", actual: "none" };
+        Map::new(self.descriptors()?, self.poses()?.ok_or(none)?)
+    }
+}
+
+impl MapFile {
+    fn check_range(&self, rows: Range<usize>) -> Result<Range<usize>> {
+        if rows.start <= rows.end && rows.end <= self.rows.len {
+            Ok(rows)
+        } else {
+            Err(Error::OutOfRange { what: "row of a map", index: rows.end, len: self.rows.len })
+        }
+    }
+
+    /// Checks the blocks these rows lie in, if that has not happened before.
+    fn touch(&self, rows: &Range<usize>) -> Result<()> {
+        self.touched.check(self.rows.blocks_of(rows), |block| self.check_block(block))
+    }
+
+    /// Checks digest and finiteness of one block of descriptors.
+    pub(super) fn check_block(&self, block: usize) -> Result<()> {
+        let bytes = self.rows.bytes_of(&self.rows.block(block));
+        let expected = &self.digests[block * BlockDigest::LENGTH..][..BlockDigest::LENGTH];
+        let check = |bytes: &[u8]| check_rows(&self.path, &self.rows, block, bytes, expected);
+        match self.mapped(&bytes) {
+            Some(bytes) => check(bytes),
+            None => check(&self.read_bytes(&bytes)?),
+        }
+    }
+
+    /// The descriptors, how many and where.
+    pub(super) fn rows(&self) -> &Rows {
+        &self.rows
+    }
+
+    fn mapped(&self, bytes: &Range<u64>) -> Option<&[u8]> {
+        let at = |position: u64| usize::try_from(position).ok();
+        self.map.as_ref()?.get(at(bytes.start)?..at(bytes.end)?)
+    }
+
+    fn read_bytes(&self, bytes: &Range<u64>) -> Result<Vec<u8>> {
+        let mut buffer = vec![0; usize::try_from(bytes.end - bytes.start).unwrap_or(usize::MAX)];
+        self.read_at(&mut buffer, bytes.start)?;
+        Ok(buffer)
+    }
+
+    fn read_at(&self, buffer: &mut [u8], start: u64) -> Result<()> {
+        access::read_exact_at(&self.file, buffer, start).map_err(Error::io(&self.path))
+    }
+
+    /// Reads and checks a tensor other than the descriptors.
+    pub(super) fn read_tensor(&self, name: &str) -> Result<Vec<u8>> {
+        let (path, header) = (&self.path, &self.header);
+        let bytes = checks::read_tensor(path, &self.file, header, name)?;
+        checks::check_tensor_digests(path, header, &self.rows, &self.digests, name, &bytes)?;
+        Ok(bytes)
+    }
+
+    /// The factor of every row of an int8 map; empty for other types.
+    fn scales(&self) -> Result<&[f32]> {
+        if let Some(scales) = self.scales.get() {
+            return Ok(scales);
+        }
+        let mut scales = Vec::new();
+        if self.rows.row_type == RowType::I8 {
+            let bytes = self.read_tensor(layout::SCALES)?;
+            scales = bytes.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+        }
+        if let Some(row) = scales.iter().position(|scale| !scale.is_finite() || *scale < 0.0) {
+            let reason = format!("is {}, not a finite positive number", scales[row]);
+            return Err(Error::format(&self.path, format!("scales, row {row}"), reason));
+        }
+        Ok(self.scales.get_or_init(|| scales))
+    }
+}
+
+fn doubles(bytes: &[u8]) -> Vec<f64> {
+    bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
+}
+
+/// The pose of a stored position and orientation; an orientation is scaled to length one unless it
+/// has it already, so that what was written is read bit by bit.
+fn pose([x, y, z]: [f64; 3], [qw, qx, qy, qz]: [f64; 4]) -> crate::Pose {
+    let stored = Quaternion::new(qw, qx, qy, qz);
+    let is_unit = (stored.norm_squared() - 1.0).abs() < 1e-12;
+    let rotation = if is_unit {
+        UnitQuaternion::new_unchecked(stored)
+    } else {
+        UnitQuaternion::from_quaternion(stored)
+    };
+    Isometry3::from_parts(Translation3::new(x, y, z), rotation)
+}
