@@ -25,6 +25,7 @@ mod definition;
 mod descriptors;
 mod error;
 mod ground_truth;
+pub mod knn;
 pub mod map;
 pub mod metrics;
 mod pose;

@@ -8,16 +8,15 @@ use std::{
 };
 
 use memmap2::Mmap;
-use nalgebra::{Isometry3, Point2, Point3, Quaternion, Translation3, UnitQuaternion};
 use ndarray::Array2;
 
 use super::{
-    About, BlockDigest, Map, Names, RowType, access, checks,
+    About, BlockDigest, Map, RowType, access, checks,
     header::Header,
     layout::{self, Rows},
     touch::{Touched, check_rows},
 };
-use crate::{Descriptors, Error, Poses, Result};
+use crate::{Descriptors, Error, Result, knn::RowSource};
 
 /// How the descriptors of an open map are reached.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -195,44 +194,6 @@ impl MapFile {
         Descriptors::new(rows)
     }
 
-    /// The poses, if the map has any.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Format`] if they are damaged, [`Error::NotFinite`] if one is not finite.
-    pub fn poses(&self) -> Result<Option<Poses>> {
-        let Some(entry) = self.header.tensors.get(layout::POSITIONS) else { return Ok(None) };
-        let positions = doubles(&self.read_tensor(layout::POSITIONS)?);
-        let poses = if entry.shape[1] == 2 {
-            Poses::Planar(positions.as_chunks().0.iter().map(|&[x, y]| Point2::new(x, y)).collect())
-        } else if self.header.tensors.contains_key(layout::ORIENTATIONS) {
-            let orientations = doubles(&self.read_tensor(layout::ORIENTATIONS)?);
-            let both = positions.as_chunks().0.iter().zip(orientations.as_chunks().0);
-            Poses::SixDof(both.map(|(position, wxyz)| pose(*position, *wxyz)).collect())
-        } else {
-            Poses::Spatial(positions.as_chunks().0.iter().map(|&xyz| Point3::from(xyz)).collect())
-        };
-        poses.check_finite()?;
-        Ok(Some(poses))
-    }
-
-    /// The names of the images, if the map has them.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Format`] if they are damaged.
-    pub fn names(&self) -> Result<Option<Names>> {
-        if !self.header.tensors.contains_key(layout::NAMES) {
-            return Ok(None);
-        }
-        let offsets = self.read_tensor(layout::NAME_OFFSETS)?;
-        let offsets: Vec<i64> =
-            offsets.as_chunks().0.iter().map(|bytes| i64::from_le_bytes(*bytes)).collect();
-        let names = Names::from_parts(self.read_tensor(layout::NAMES)?, &offsets)
-            .map_err(|reason| Error::format(&self.path, "tensor `names`", reason))?;
-        Ok(Some(names))
-    }
-
     /// The whole map in memory.
     ///
     /// # Errors
@@ -273,6 +234,10 @@ impl MapFile {
     /// The descriptors, how many and where.
     pub(super) fn rows(&self) -> &Rows {
         &self.rows
+    }
+
+    pub(super) fn stored_digests(&self) -> &[u8] {
+        &self.digests
     }
 
     fn mapped(&self, bytes: &Range<u64>) -> Option<&[u8]> {
@@ -316,19 +281,120 @@ impl MapFile {
     }
 }
 
-fn doubles(bytes: &[u8]) -> Vec<f64> {
-    bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
+impl RowSource for MapFile {
+    fn len(&self) -> usize {
+        self.rows.len
+    }
+
+    fn dim(&self) -> usize {
+        self.rows.dim
+    }
+
+    fn block<'a>(&'a self, rows: Range<usize>, scratch: &'a mut Vec<f32>) -> Result<&'a [f32]> {
+        if let Some(values) = self.rows_in_place(rows.clone())? {
+            return Ok(values);
+        }
+        scratch.resize(rows.len() * self.rows.dim, 0.0);
+        self.read_rows(rows.start, scratch)?;
+        Ok(scratch)
+    }
 }
 
-/// The pose of a stored position and orientation; an orientation is scaled to length one unless it
-/// has it already, so that what was written is read bit by bit.
-fn pose([x, y, z]: [f64; 3], [qw, qx, qy, qz]: [f64; 4]) -> crate::Pose {
-    let stored = Quaternion::new(qw, qx, qy, qz);
-    let is_unit = (stored.norm_squared() - 1.0).abs() < 1e-12;
-    let rotation = if is_unit {
-        UnitQuaternion::new_unchecked(stored)
-    } else {
-        UnitQuaternion::from_quaternion(stored)
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use ndarray::array;
+
+    use super::*;
+    use crate::{
+        PlanarPosition, Pose, Poses,
+        map::{MapWriter, Names},
     };
-    Isometry3::from_parts(Translation3::new(x, y, z), rotation)
+
+    fn write(path: &Path, row_type: RowType, n: usize) -> Map {
+        let descriptors = Array2::from_shape_fn((n, 5), |(row, column)| {
+            f32::from(u16::try_from(row * 31 + column * 7).unwrap()).sin()
+        });
+        let poses = (0..n).map(|row| {
+            let angle = row as f64 * 0.1;
+            Pose::new([row as f64, 2.0, -1.5].into(), [0.1, angle, 0.3].into())
+        });
+        let map = Map::new(Descriptors::new(descriptors).unwrap(), Poses::SixDof(poses.collect()));
+        let map = map.unwrap();
+        let names: Names = (0..n).map(|row| format!("frame-{row:06}.png")).collect();
+        let mut writer = MapWriter::create(path, 5, row_type, About::default()).unwrap();
+        writer.append(map.descriptors().view(), Some(map.poses()), Some(&names)).unwrap();
+        writer.finish().unwrap();
+        map
+    }
+
+    #[test]
+    fn what_is_written_is_read_bit_by_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.safetensors");
+        let map = write(&path, RowType::F32, 100);
+        for access in [Access::Mapped, Access::Read] {
+            let file = MapFile::open_with(&path, Opening { access, trust: false }).unwrap();
+            assert_eq!(file.to_map().unwrap(), map);
+            assert_eq!(file.names().unwrap().unwrap().get(99), Some("frame-000099.png"));
+            assert_eq!(file.rows_in_place(0..1).unwrap().is_some(), access == Access::Mapped);
+        }
+    }
+
+    #[test]
+    fn smaller_rows_stay_close() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.safetensors");
+        for (row_type, tolerance) in [(RowType::F16, 1.0 / 2048.0), (RowType::I8, 0.5001 / 127.0)] {
+            let map = write(&path, row_type, 33);
+            let stored = MapFile::open(&path).unwrap().descriptors().unwrap();
+            for (stored, exact) in stored.view().iter().zip(map.descriptors().view()) {
+                assert!((stored - exact).abs() <= tolerance, "{row_type}: {exact} became {stored}");
+            }
+        }
+    }
+
+    #[test]
+    fn damage_is_found_when_it_is_touched_unless_trusted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.safetensors");
+        write(&path, RowType::F32, 100);
+        let mut bytes = fs::read(&path).unwrap();
+        bytes[layout::ALIGNMENT + 70] ^= 1;
+        fs::write(&path, &bytes).unwrap();
+        let err = MapFile::open(&path).unwrap().descriptors().unwrap_err().to_string();
+        assert!(
+            err.contains("descriptors, rows 0..100: the bytes do not have the digest"),
+            "{err}"
+        );
+        let opening = Opening { trust: true, ..Opening::default() };
+        MapFile::open_with(&path, opening).unwrap().descriptors().unwrap();
+    }
+
+    #[test]
+    fn an_open_map_stays_when_the_file_is_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.safetensors");
+        let old = write(&path, RowType::F32, 10);
+        let file = MapFile::open(&path).unwrap();
+        write(&path, RowType::F32, 20);
+        assert_eq!(file.to_map().unwrap(), old);
+        assert_eq!(MapFile::open(&path).unwrap().len(), 20);
+    }
+
+    #[test]
+    fn descriptors_alone_are_a_map_file_without_poses() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.safetensors");
+        let mut writer = MapWriter::create(&path, 2, RowType::F32, About::default()).unwrap();
+        writer.append(array![[1.0, 2.0]].view(), None, None).unwrap();
+        let poses = Poses::Planar(vec![PlanarPosition::origin()]);
+        let err = writer.append(array![[1.0, 2.0]].view(), Some(&poses), None).unwrap_err();
+        assert!(matches!(err, Error::Mismatch { .. }), "{err}");
+        writer.finish().unwrap();
+        let file = MapFile::open(&path).unwrap();
+        assert_eq!((file.poses().unwrap(), file.names().unwrap()), (None, None));
+        assert!(matches!(file.to_map(), Err(Error::PoseKind { .. })));
+    }
 }

@@ -113,7 +113,7 @@ impl Rows {
             Error::format(path, "metadata `rows_per_block`", "is no positive number")
         })?;
         let start = header.data_start + entry.data_offsets[0];
-        if start % 64 != 0 {
+        if !start.is_multiple_of(64) {
             return Err(wrong("does not start at a multiple of 64 bytes"));
         }
         Ok(Self { len, dim, row_type, start, per_block })

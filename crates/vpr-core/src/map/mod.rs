@@ -3,6 +3,7 @@
 mod about;
 mod access;
 mod checks;
+mod companions;
 mod digest;
 mod file;
 mod header;

@@ -37,6 +37,7 @@ impl Names {
     }
 
     /// All names in order.
+    #[must_use]
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &str> {
         (0..self.len()).map(|index| self.get(index).unwrap_or_default())
     }
@@ -55,14 +56,13 @@ impl Names {
     /// What is wrong with the text or the offsets.
     pub fn from_parts(text: Vec<u8>, offsets: &[i64]) -> Result<Self, String> {
         let text = String::from_utf8(text).map_err(|err| format!("names are no UTF-8: {err}"))?;
-        let offset = |index: usize| usize::try_from(offsets[index]).ok();
         let mut ends = Vec::with_capacity(offsets.len().saturating_sub(1));
         let mut start = 0;
-        for index in 0..offsets.len() {
-            match offset(index) {
+        for (index, &offset) in offsets.iter().enumerate() {
+            match usize::try_from(offset).ok() {
                 Some(end) if end >= start && text.is_char_boundary(end) => start = end,
                 _ => {
-                    let (offset, len) = (offsets[index], text.len());
+                    let len = text.len();
                     return Err(format!("offset {index} is {offset}, in {len} bytes of names"));
                 }
             }

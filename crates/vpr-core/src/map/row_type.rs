@@ -5,6 +5,7 @@ use std::{fmt, str::FromStr};
 use half::f16;
 
 use super::header::ElementType;
+use crate::knn::{Int8Row, encode_f16, encode_int8};
 
 /// How one descriptor is stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,17 +63,15 @@ impl RowType {
         match self {
             Self::F32 => bytes.extend(row.iter().flat_map(|value| value.to_le_bytes())),
             Self::F16 => {
-                for (column, &value) in row.iter().enumerate() {
-                    let half = f16::from_f32(value);
-                    if !half.is_finite() {
-                        return Err(column);
-                    }
-                    bytes.extend(half.to_le_bytes());
+                let codes = encode_f16(row);
+                if let Some(column) = codes.iter().position(|code| !code.is_finite()) {
+                    return Err(column);
                 }
+                bytes.extend(codes.iter().flat_map(|code| code.to_le_bytes()));
             }
             Self::I8 => {
-                let scale = byte_scale(row);
-                bytes.extend(row.iter().map(|&value| byte(value, scale).to_le_bytes()[0]));
+                let Int8Row { scale, codes } = encode_int8(row);
+                bytes.extend(codes.iter().flat_map(|code| code.to_le_bytes()));
                 return Ok(scale);
             }
         }
@@ -80,6 +79,8 @@ impl RowType {
     }
 
     /// Writes the values of one stored row into `row`; `bytes` has `row.len() ×` [`Self::size`].
+    ///
+    /// Gives the bits of [`crate::knn::decode_f16`] and [`crate::knn::decode_int8`].
     pub fn decode(self, bytes: &[u8], scale: f32, row: &mut [f32]) {
         match self {
             Self::F32 => {
@@ -148,18 +149,6 @@ fn first<const N: usize>(chunks: &[[u8; N]], bad: impl Fn(&[u8; N]) -> bool) -> 
         }
     }
     None
-}
-
-/// Largest magnitude ÷ 127, and 1 for a row of zeros.
-fn byte_scale(row: &[f32]) -> f32 {
-    let largest = row.iter().fold(0.0_f32, |largest, value| largest.max(value.abs()));
-    let scale = largest / 127.0;
-    if scale > 0.0 { scale } else { 1.0 }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "rounded and clamped to ±127")]
-fn byte(value: f32, scale: f32) -> i8 {
-    (value / scale).round_ties_even().clamp(-127.0, 127.0) as i8
 }
 
 #[cfg(test)]

@@ -1,0 +1,63 @@
+//! What a map file holds beside descriptors: poses and names.
+
+use nalgebra::{Isometry3, Point2, Point3, Quaternion, Translation3, UnitQuaternion};
+
+use super::{MapFile, Names, layout};
+use crate::{Error, Poses, Result};
+
+impl MapFile {
+    /// The poses, if the map has any.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] if they are damaged, [`Error::NotFinite`] if one is not finite.
+    pub fn poses(&self) -> Result<Option<Poses>> {
+        let Some(entry) = self.header().tensors.get(layout::POSITIONS) else { return Ok(None) };
+        let positions = doubles(&self.read_tensor(layout::POSITIONS)?);
+        let poses = if entry.shape[1] == 2 {
+            Poses::Planar(positions.as_chunks().0.iter().map(|&[x, y]| Point2::new(x, y)).collect())
+        } else if self.header().tensors.contains_key(layout::ORIENTATIONS) {
+            let orientations = doubles(&self.read_tensor(layout::ORIENTATIONS)?);
+            let both = positions.as_chunks().0.iter().zip(orientations.as_chunks().0);
+            Poses::SixDof(both.map(|(position, wxyz)| pose(*position, *wxyz)).collect())
+        } else {
+            Poses::Spatial(positions.as_chunks().0.iter().map(|&xyz| Point3::from(xyz)).collect())
+        };
+        poses.check_finite()?;
+        Ok(Some(poses))
+    }
+
+    /// The names of the images, if the map has them.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] if they are damaged.
+    pub fn names(&self) -> Result<Option<Names>> {
+        if !self.header().tensors.contains_key(layout::NAMES) {
+            return Ok(None);
+        }
+        let offsets = self.read_tensor(layout::NAME_OFFSETS)?;
+        let offsets: Vec<i64> =
+            offsets.as_chunks().0.iter().map(|bytes| i64::from_le_bytes(*bytes)).collect();
+        let names = Names::from_parts(self.read_tensor(layout::NAMES)?, &offsets)
+            .map_err(|reason| Error::format(self.path(), "tensor `names`", reason))?;
+        Ok(Some(names))
+    }
+}
+
+fn doubles(bytes: &[u8]) -> Vec<f64> {
+    bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
+}
+
+/// The pose of a stored position and orientation; an orientation is scaled to length one unless it
+/// has it already, so that what was written is read bit by bit.
+fn pose([x, y, z]: [f64; 3], [qw, qx, qy, qz]: [f64; 4]) -> crate::Pose {
+    let stored = Quaternion::new(qw, qx, qy, qz);
+    let is_unit = (stored.norm_squared() - 1.0).abs() < 1e-12;
+    let rotation = if is_unit {
+        UnitQuaternion::new_unchecked(stored)
+    } else {
+        UnitQuaternion::from_quaternion(stored)
+    };
+    Isometry3::from_parts(Translation3::new(x, y, z), rotation)
+}
