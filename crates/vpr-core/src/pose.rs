@@ -44,6 +44,21 @@ impl Poses {
         self.len() == 0
     }
 
+    /// Adds the poses of more images.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::PoseKind`] if they are of another kind.
+    pub fn extend(&mut self, more: &Self) -> Result<()> {
+        match (self, more) {
+            (Self::Planar(all), Self::Planar(more)) => all.extend(more),
+            (Self::Spatial(all), Self::Spatial(more)) => all.extend(more),
+            (Self::SixDof(all), Self::SixDof(more)) => all.extend(more),
+            (all, more) => return Err(Error::PoseKind { needed: more.kind(), actual: all.kind() }),
+        }
+        Ok(())
+    }
+
     /// How the kind is called in messages.
     #[must_use]
     pub fn kind(&self) -> &'static str {

@@ -6,6 +6,18 @@ use super::{MapFile, Names, layout};
 use crate::{Error, Poses, Result};
 
 impl MapFile {
+    /// How the kind of pose is called in messages, as [`Poses::kind`]; `None` without poses.
+    #[must_use]
+    pub fn pose_kind(&self) -> Option<&'static str> {
+        let tensors = &self.header().tensors;
+        let width = tensors.get(layout::POSITIONS)?.shape[1];
+        Some(match (width, tensors.contains_key(layout::ORIENTATIONS)) {
+            (2, _) => "planar",
+            (_, false) => "spatial",
+            (_, true) => "6-DoF",
+        })
+    }
+
     /// The poses, if the map has any.
     ///
     /// # Errors

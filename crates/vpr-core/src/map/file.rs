@@ -183,6 +183,22 @@ impl MapFile {
         Ok(bytes.and_then(|bytes| bytemuck::try_cast_slice(bytes).ok()))
     }
 
+    /// Shows the stored bytes of these rows, and the scales of int8 rows.
+    pub(super) fn with_stored(
+        &self,
+        rows: Range<usize>,
+        show: impl FnOnce(&[u8], &[f32]) -> Result<()>,
+    ) -> Result<()> {
+        let rows = self.check_range(rows)?;
+        self.touch(&rows)?;
+        let scales = self.scales()?.get(rows.clone()).unwrap_or_default();
+        let bytes = self.rows.bytes_of(&rows);
+        match self.mapped(&bytes) {
+            Some(bytes) => show(bytes, scales),
+            None => show(&self.read_bytes(&bytes)?, scales),
+        }
+    }
+
     /// All descriptors, in memory.
     ///
     /// # Errors

@@ -9,8 +9,10 @@ mod file;
 mod header;
 mod layout;
 mod names;
+mod open_map;
 mod replace;
 mod row_type;
+mod segments;
 mod touch;
 mod writer;
 
@@ -19,8 +21,10 @@ pub use digest::{BlockDigest, image_list_digest};
 pub use file::{Access, MapFile, Opening};
 pub use header::{ElementType, Header, TensorEntry};
 pub use names::Names;
+pub use open_map::{OpenMap, merge};
 pub use replace::{NewFile, replace};
 pub use row_type::RowType;
+pub use segments::GrowingMap;
 pub use writer::{MapWriter, write};
 
 use crate::{Descriptors, Error, Poses, Result};

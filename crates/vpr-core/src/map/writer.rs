@@ -91,9 +91,7 @@ impl MapWriter {
         if descriptors.ncols() != expected {
             return Err(Error::Mismatch { what, expected, actual: descriptors.ncols() });
         }
-        let n_rows = descriptors.nrows();
-        self.add_poses(poses, n_rows)?;
-        self.add_names(names, n_rows)?;
+        self.begin(descriptors.nrows(), poses, names)?;
         let mut contiguous = vec![0.0; self.rows.dim];
         for row in descriptors.outer_iter() {
             if let Some(row) = row.as_slice() {
@@ -106,6 +104,27 @@ impl MapWriter {
         Ok(())
     }
 
+    /// Takes poses and names of the `n_rows` images whose descriptors come next.
+    pub(super) fn begin(
+        &mut self,
+        n_rows: usize,
+        poses: Option<&Poses>,
+        names: Option<&Names>,
+    ) -> Result<()> {
+        self.add_poses(poses, n_rows)?;
+        self.add_names(names, n_rows)
+    }
+
+    /// Adds rows that are already stored as this writer stores them.
+    pub(super) fn push_stored(&mut self, bytes: &[u8], scales: &[f32]) -> Result<()> {
+        self.scales.extend(scales);
+        for row in bytes.chunks_exact(self.rows.row_bytes()) {
+            self.block.extend(row);
+            self.end_row()?;
+        }
+        Ok(())
+    }
+
     fn push_row(&mut self, row: &[f32]) -> Result<()> {
         let scale = self.rows.row_type.encode(row, &mut self.block).map_err(|column| {
             let value = f64::from(row[column]);
@@ -114,6 +133,10 @@ impl MapWriter {
         if self.rows.row_type == RowType::I8 {
             self.scales.push(scale);
         }
+        self.end_row()
+    }
+
+    fn end_row(&mut self) -> Result<()> {
         self.rows.len += 1;
         if self.rows.len.is_multiple_of(self.rows.per_block) {
             self.flush_block()?;
@@ -142,14 +165,9 @@ impl MapWriter {
         }
         let Some(poses) = poses else { return Ok(()) };
         poses.check_finite()?;
-        match (&mut self.poses, poses) {
-            (None, poses) => self.poses = Some(poses.clone()),
-            (Some(Poses::Planar(all)), Poses::Planar(more)) => all.extend(more),
-            (Some(Poses::Spatial(all)), Poses::Spatial(more)) => all.extend(more),
-            (Some(Poses::SixDof(all)), Poses::SixDof(more)) => all.extend(more),
-            (Some(all), more) => {
-                return Err(Error::PoseKind { needed: more.kind(), actual: all.kind() });
-            }
+        match &mut self.poses {
+            None => self.poses = Some(poses.clone()),
+            Some(all) => all.extend(poses)?,
         }
         Ok(())
     }
@@ -173,7 +191,7 @@ impl MapWriter {
         Ok(())
     }
 
-    /// Writes the rest and makes the map appear under its name.
+    /// Writes the rest and makes the map appear under its name; returns its header's digest.
     ///
     /// # Errors
     ///
@@ -182,11 +200,11 @@ impl MapWriter {
     /// # Panics
     ///
     /// Never: the header has room for every number it may hold.
-    pub fn finish(mut self) -> Result<()> {
+    pub fn finish(mut self) -> Result<String> {
         if !self.block.is_empty() {
             self.flush_block()?;
         }
-        let (header, tail) = self.header_and_tail();
+        let (header, tail, digest) = self.header_and_tail();
         let path = self.path.clone();
         let io_error = || Error::io(&path);
         let mut out = BufWriter::new(self.file.file());
@@ -195,11 +213,12 @@ impl MapWriter {
         out.write_all(&header).map_err(io_error())?;
         out.flush().map_err(io_error())?;
         drop(out);
-        self.file.commit()
+        self.file.commit()?;
+        Ok(digest)
     }
 
-    /// The finished header, and the bytes of every tensor after the descriptors.
-    fn header_and_tail(&mut self) -> (Vec<u8>, Vec<Vec<u8>>) {
+    /// The finished header, the bytes of every tensor after the descriptors, the header's digest.
+    fn header_and_tail(&mut self) -> (Vec<u8>, Vec<Vec<u8>>, String) {
         let mut header = Header { data_start: self.rows.start, ..Header::default() };
         let mut end = 0;
         let mut place =
@@ -231,8 +250,8 @@ impl MapWriter {
         tail.push(std::mem::take(&mut self.digests));
         let unsigned = header.render(layout::ALIGNMENT);
         let digest = layout::header_digest(&unsigned[8..], layout::NO_DIGEST).to_hex();
-        header.metadata.insert(layout::HEADER_DIGEST.to_owned(), digest);
-        (header.render(layout::ALIGNMENT), tail)
+        header.metadata.insert(layout::HEADER_DIGEST.to_owned(), digest.clone());
+        (header.render(layout::ALIGNMENT), tail, digest)
     }
 
     /// Name, type, shape and bytes of every tensor between descriptors and digests.
@@ -283,7 +302,7 @@ pub fn write(path: &Path, map: &Map, names: Option<&Names>, about: About) -> Res
     let dim = map.descriptors().dim();
     let mut writer = MapWriter::create(path, dim, RowType::F32, about)?;
     writer.append(map.descriptors().view(), Some(map.poses()), names)?;
-    writer.finish()
+    writer.finish().map(drop)
 }
 
 fn wxyz(pose: &Pose) -> [f64; 4] {
