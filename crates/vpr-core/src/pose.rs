@@ -113,25 +113,34 @@ impl Poses {
     ///
     /// [`Error::NotFinite`] names the first image whose position or orientation is not.
     pub fn check_finite(&self) -> Result<()> {
-        for row in 0..self.len() {
-            let values: Vec<f64> = match self {
-                Self::Planar(positions) => positions[row].iter().copied().collect(),
-                Self::Spatial(positions) => positions[row].iter().copied().collect(),
-                Self::SixDof(poses) => {
-                    let pose = &poses[row];
-                    pose.translation
-                        .vector
-                        .iter()
-                        .chain(pose.rotation.coords.iter())
-                        .copied()
-                        .collect()
-                }
-            };
-            if let Some(column) = values.iter().position(|value| !value.is_finite()) {
-                return Err(Error::NotFinite { what: "poses", row, column, value: values[column] });
+        match (0..self.len()).find_map(|row| Some((row, self.first_not_finite(row)?))) {
+            None => Ok(()),
+            Some((row, column)) => {
+                let value = self.values(row)[column];
+                Err(Error::NotFinite { what: "poses", row, column, value })
             }
         }
-        Ok(())
+    }
+
+    /// The first number of a pose that is NaN or infinite: position, then quaternion.
+    ///
+    /// # Panics
+    ///
+    /// If `row` is not below [`Self::len`].
+    #[must_use]
+    pub fn first_not_finite(&self, row: usize) -> Option<usize> {
+        self.values(row).iter().position(|value| !value.is_finite())
+    }
+
+    fn values(&self, row: usize) -> Vec<f64> {
+        match self {
+            Self::Planar(positions) => positions[row].iter().copied().collect(),
+            Self::Spatial(positions) => positions[row].iter().copied().collect(),
+            Self::SixDof(poses) => {
+                let Pose { rotation, translation } = &poses[row];
+                translation.vector.iter().chain(rotation.coords.iter()).copied().collect()
+            }
+        }
     }
 }
 

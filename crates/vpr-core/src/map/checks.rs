@@ -4,26 +4,30 @@ use std::{fs::File, path::Path};
 
 use super::{
     BlockDigest, access,
-    header::{ElementType, Header, shorten},
+    header::{ElementType, Header, TensorEntry, shorten},
     layout::{self, Rows},
     touch::damaged,
 };
 use crate::{Error, Result};
 
-/// The file is a map of this version, and its header is the one that was written.
-pub(super) fn check_header(path: &Path, header: &Header, json: &[u8]) -> Result<()> {
+/// The file is a map of this version.
+pub(super) fn check_format(path: &Path, header: &Header) -> Result<()> {
     let (key, expected) = layout::FORMAT;
     match header.metadata.get(key) {
-        Some(format) if format == expected => {}
+        Some(format) if format == expected => Ok(()),
         Some(format) => {
             let reason = format!("is `{}`, this program reads `{expected}`", shorten(format));
-            return Err(Error::format(path, format!("metadata `{key}`"), reason));
+            Err(Error::format(path, format!("metadata `{key}`"), reason))
         }
         None => {
             let reason = "a safetensors file, but no map: its metadata have no `format`";
-            return Err(Error::format(path, "header", reason));
+            Err(Error::format(path, "header", reason))
         }
     }
+}
+
+/// The header is the one that was written.
+pub(super) fn check_header(path: &Path, header: &Header, json: &[u8]) -> Result<()> {
     let stored = header.metadata.get(layout::HEADER_DIGEST).map_or("", String::as_str);
     if layout::header_digest(json, stored).to_hex() == stored {
         Ok(())
@@ -32,19 +36,29 @@ pub(super) fn check_header(path: &Path, header: &Header, json: &[u8]) -> Result<
     }
 }
 
-/// Every tensor has the shape it must have, and none is there without those it needs.
-pub(super) fn check_tensors(path: &Path, header: &Header, rows: &Rows) -> Result<()> {
-    for (name, entry) in &header.tensors {
-        layout::check_shape(path, name, entry, rows.len as u64)?;
-        if !layout::ORDER.contains(&name.as_str()) {
-            let place = format!("tensor `{}`", shorten(name));
-            return Err(Error::format(path, place, "is no part of a map"));
-        }
-        let size = entry.dtype.size().unwrap_or(1);
-        if !(header.data_start + entry.data_offsets[0]).is_multiple_of(size) {
-            return Err(Error::format(path, format!("tensor `{name}`"), "is not aligned"));
-        }
+/// A tensor has the shape it must have and lies where it can be read.
+pub(super) fn check_tensor(
+    path: &Path,
+    header: &Header,
+    rows: &Rows,
+    name: &str,
+    entry: &TensorEntry,
+) -> Result<()> {
+    let place = || format!("tensor `{}`", shorten(name));
+    if !layout::ORDER.contains(&name) {
+        return Err(Error::format(path, place(), "is no part of a map"));
     }
+    layout::check_shape(path, name, entry, rows.len as u64)?;
+    let size = entry.dtype.size().unwrap_or(1);
+    if (header.data_start + entry.data_offsets[0]).is_multiple_of(size) {
+        Ok(())
+    } else {
+        Err(Error::format(path, place(), "is not aligned"))
+    }
+}
+
+/// No tensor is there without those it needs.
+pub(super) fn check_companions(path: &Path, header: &Header, rows: &Rows) -> Result<()> {
     let has = |name: &str| header.tensors.contains_key(name);
     let int8 = rows.row_type.element() == ElementType::I8;
     let lone = |name: &str, needed: &str| {
@@ -63,24 +77,29 @@ pub(super) fn check_tensors(path: &Path, header: &Header, rows: &Rows) -> Result
     Ok(())
 }
 
-/// The table of digests is the one that was written, and has a digest for every block.
-pub(super) fn check_digests(
+/// The table of digests is the one that was written.
+pub(super) fn check_digests(path: &Path, header: &Header, digests: &[u8]) -> Result<()> {
+    let stored = header.metadata.get(layout::DIGESTS_DIGEST).map_or("", String::as_str);
+    if BlockDigest::of(digests).to_hex() == stored {
+        return Ok(());
+    }
+    Err(Error::format(path, format!("tensor `{}`", layout::DIGESTS), damaged()))
+}
+
+/// Every block has a digest.
+pub(super) fn check_n_digests(
     path: &Path,
     header: &Header,
     rows: &Rows,
     digests: &[u8],
 ) -> Result<()> {
-    let place = || format!("tensor `{}`", layout::DIGESTS);
-    let stored = header.metadata.get(layout::DIGESTS_DIGEST).map_or("", String::as_str);
-    if BlockDigest::of(digests).to_hex() != stored {
-        return Err(Error::format(path, place(), damaged()));
-    }
     let n_blocks = rows.n_blocks() + layout::other_blocks(header).len();
-    if digests.len() == n_blocks * BlockDigest::LENGTH {
+    let n_digests = digests.len() / BlockDigest::LENGTH;
+    if n_digests == n_blocks {
         return Ok(());
     }
-    let n_digests = digests.len() / BlockDigest::LENGTH;
-    Err(Error::format(path, place(), format!("has {n_digests} digests for {n_blocks} blocks")))
+    let reason = format!("has {n_digests} digests for {n_blocks} blocks");
+    Err(Error::format(path, format!("tensor `{}`", layout::DIGESTS), reason))
 }
 
 /// Reads the bytes of a tensor without checking its digests.

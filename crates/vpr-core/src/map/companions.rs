@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point2, Point3, Quaternion, Translation3, UnitQuaternion};
 
-use super::{MapFile, Names, layout};
+use super::{MapFile, Names, checks, layout};
 use crate::{Error, Poses, Result};
 
 impl MapFile {
@@ -24,19 +24,55 @@ impl MapFile {
     ///
     /// [`Error::Format`] if they are damaged, [`Error::NotFinite`] if one is not finite.
     pub fn poses(&self) -> Result<Option<Poses>> {
+        let poses = self.poses_from(|name| Ok(doubles(&self.read_tensor(name)?)))?;
+        poses.as_ref().map(Poses::check_finite).transpose()?;
+        Ok(poses)
+    }
+
+    /// The poses as they are, whatever their digests; finite or not.
+    pub(super) fn poses_unchecked(&self) -> Result<Option<Poses>> {
+        self.poses_from(|name| Ok(doubles(&self.read_tensor_unchecked(name)?)))
+    }
+
+    fn poses_from(&self, read: impl Fn(&str) -> Result<Vec<f64>>) -> Result<Option<Poses>> {
         let Some(entry) = self.header().tensors.get(layout::POSITIONS) else { return Ok(None) };
-        let positions = doubles(&self.read_tensor(layout::POSITIONS)?);
+        let positions = read(layout::POSITIONS)?;
         let poses = if entry.shape[1] == 2 {
             Poses::Planar(positions.as_chunks().0.iter().map(|&[x, y]| Point2::new(x, y)).collect())
         } else if self.header().tensors.contains_key(layout::ORIENTATIONS) {
-            let orientations = doubles(&self.read_tensor(layout::ORIENTATIONS)?);
+            let orientations = read(layout::ORIENTATIONS)?;
             let both = positions.as_chunks().0.iter().zip(orientations.as_chunks().0);
             Poses::SixDof(both.map(|(position, wxyz)| pose(*position, *wxyz)).collect())
         } else {
             Poses::Spatial(positions.as_chunks().0.iter().map(|&xyz| Point3::from(xyz)).collect())
         };
-        poses.check_finite()?;
         Ok(Some(poses))
+    }
+
+    /// Checks the digests of positions and orientations.
+    pub(super) fn check_pose_digests(&self) -> Result<()> {
+        [layout::POSITIONS, layout::ORIENTATIONS]
+            .into_iter()
+            .filter(|name| self.header().tensors.contains_key(*name))
+            .try_for_each(|name| self.read_tensor(name).map(drop))
+    }
+
+    /// The lengths of the stored quaternions; none without orientations.
+    pub(super) fn orientation_lengths(&self) -> Result<Vec<f64>> {
+        if !self.header().tensors.contains_key(layout::ORIENTATIONS) {
+            return Ok(Vec::new());
+        }
+        let wxyz = doubles(&self.read_tensor_unchecked(layout::ORIENTATIONS)?);
+        let length = |wxyz: &[f64; 4]| wxyz.iter().map(|x| x * x).sum::<f64>().sqrt();
+        Ok(wxyz.as_chunks().0.iter().map(length).collect())
+    }
+
+    /// Reads and checks a tensor other than the descriptors.
+    pub(super) fn read_tensor(&self, name: &str) -> Result<Vec<u8>> {
+        let bytes = self.read_tensor_unchecked(name)?;
+        let (path, header) = (self.path(), self.header());
+        checks::check_tensor_digests(path, header, self.rows(), self.digests(), name, &bytes)?;
+        Ok(bytes)
     }
 
     /// The names of the images, if the map has them.

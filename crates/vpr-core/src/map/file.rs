@@ -14,7 +14,7 @@ use super::{
     About, BlockDigest, Map, RowType, access, checks,
     header::Header,
     layout::{self, Rows},
-    touch::{Touched, check_rows},
+    touch::{Touched, check_digest, check_finite},
 };
 use crate::{Descriptors, Error, Result, knn::RowSource};
 
@@ -36,6 +36,35 @@ pub struct Opening {
     pub access: Access,
     /// Skips the check of digests and finiteness when a block is first touched.
     pub trust: bool,
+}
+
+/// What happens to a problem that is found while opening a map.
+pub(super) enum Strictness<'a> {
+    /// Opening stops, and this is why.
+    StopAt(&'a mut Option<Error>),
+    /// It is noted, and opening goes on if that makes sense.
+    Report(&'a mut Vec<Error>),
+}
+
+impl Strictness<'_> {
+    /// The value that opening cannot do without.
+    fn need<T>(&mut self, result: Result<T>) -> Option<T> {
+        let err = match result {
+            Ok(value) => return Some(value),
+            Err(err) => err,
+        };
+        match self {
+            Self::StopAt(first) => **first = Some(err),
+            Self::Report(problems) => problems.push(err),
+        }
+        None
+    }
+
+    /// The value of a check, or `Some(None)` if it failed and opening may go on nevertheless.
+    fn pass<T>(&mut self, result: Result<T>) -> Option<Option<T>> {
+        let value = self.need(result);
+        if value.is_none() && matches!(self, Self::StopAt(_)) { None } else { Some(value) }
+    }
 }
 
 /// One map file, open for reading.
@@ -73,23 +102,42 @@ impl MapFile {
     ///
     /// Those of [`Self::open`].
     pub fn open_with(path: &Path, opening: Opening) -> Result<Self> {
-        let file = File::open(path).map_err(Error::io(path))?;
-        let (header, json) = Header::read(path, &file)?;
-        checks::check_header(path, &header, &json)?;
-        let rows = Rows::of(path, &header)?;
-        checks::check_tensors(path, &header, &rows)?;
+        let mut first = None;
+        Self::open_as(path, opening, &mut Strictness::StopAt(&mut first)).ok_or_else(|| {
+            first.unwrap_or_else(|| Error::format(path, "file", "could not be opened"))
+        })
+    }
+
+    /// Opens a map; `None` if that stopped at a problem, or if no reading is possible.
+    pub(super) fn open_as(
+        path: &Path,
+        opening: Opening,
+        strictness: &mut Strictness<'_>,
+    ) -> Option<Self> {
+        let file = strictness.need(File::open(path).map_err(Error::io(path)))?;
+        let (header, json) = strictness.need(Header::read(path, &file))?;
+        strictness.need(checks::check_format(path, &header))?;
+        strictness.pass(checks::check_header(path, &header, &json))?;
+        let rows = strictness.need(Rows::of(path, &header))?;
+        for (name, entry) in &header.tensors {
+            strictness.need(checks::check_tensor(path, &header, &rows, name, entry))?;
+        }
+        strictness.need(checks::check_companions(path, &header, &rows))?;
         let about = About::read_from(&header.metadata)
-            .map_err(|(place, reason)| Error::format(path, place, reason))?;
-        let digests = checks::read_tensor(path, &file, &header, layout::DIGESTS)?;
-        checks::check_digests(path, &header, &rows, &digests)?;
+            .map_err(|(place, reason)| Error::format(path, place, reason));
+        let about = strictness.pass(about)?.unwrap_or_default();
+        let digests = checks::read_tensor(path, &file, &header, layout::DIGESTS);
+        let digests = strictness.need(digests)?;
+        strictness.pass(checks::check_digests(path, &header, &digests))?;
+        strictness.need(checks::check_n_digests(path, &header, &rows, &digests))?;
         let map = match opening.access {
-            Access::Mapped => Some(access::map(&file).map_err(Error::io(path))?),
+            Access::Mapped => Some(strictness.need(access::map(&file).map_err(Error::io(path)))?),
             Access::Read => None,
         };
         let touched = if opening.trust { Touched::all() } else { Touched::none(rows.n_blocks()) };
         let path = path.to_owned();
         let scales = OnceLock::new();
-        Ok(Self { path, file, map, header, about, rows, digests, touched, scales })
+        Some(Self { path, file, map, header, about, rows, digests, touched, scales })
     }
 
     /// The file, as it was named when it was opened.
@@ -192,11 +240,7 @@ impl MapFile {
         let rows = self.check_range(rows)?;
         self.touch(&rows)?;
         let scales = self.scales()?.get(rows.clone()).unwrap_or_default();
-        let bytes = self.rows.bytes_of(&rows);
-        match self.mapped(&bytes) {
-            Some(bytes) => show(bytes, scales),
-            None => show(&self.read_bytes(&bytes)?, scales),
-        }
+        self.with_bytes(&rows, |bytes| show(bytes, scales))
     }
 
     /// All descriptors, in memory.
@@ -237,14 +281,41 @@ impl MapFile {
     }
 
     /// Checks digest and finiteness of one block of descriptors.
-    pub(super) fn check_block(&self, block: usize) -> Result<()> {
-        let bytes = self.rows.bytes_of(&self.rows.block(block));
-        let expected = &self.digests[block * BlockDigest::LENGTH..][..BlockDigest::LENGTH];
-        let check = |bytes: &[u8]| check_rows(&self.path, &self.rows, block, bytes, expected);
+    fn check_block(&self, block: usize) -> Result<()> {
+        let range = self.rows.block(block);
+        self.with_bytes(&range, |bytes| {
+            check_digest(&self.path, &range, bytes, self.stored_digest(block))?;
+            check_finite(&self.path, &self.rows, &range, bytes)
+        })
+    }
+
+    /// Checks the digest of one block of descriptors.
+    pub(super) fn check_digest(&self, block: usize) -> Result<()> {
+        let range = self.rows.block(block);
+        let stored = self.stored_digest(block);
+        self.with_bytes(&range, |bytes| check_digest(&self.path, &range, bytes, stored))
+    }
+
+    fn stored_digest(&self, block: usize) -> &[u8] {
+        &self.digests[block * BlockDigest::LENGTH..][..BlockDigest::LENGTH]
+    }
+
+    /// Shows the bytes of these rows as they are stored.
+    fn with_bytes(
+        &self,
+        rows: &Range<usize>,
+        show: impl FnOnce(&[u8]) -> Result<()>,
+    ) -> Result<()> {
+        let bytes = self.rows.bytes_of(rows);
         match self.mapped(&bytes) {
-            Some(bytes) => check(bytes),
-            None => check(&self.read_bytes(&bytes)?),
+            Some(bytes) => show(bytes),
+            None => show(&self.read_bytes(&bytes)?),
         }
+    }
+
+    /// Checks the scales of an int8 map.
+    pub(super) fn check_scales(&self) -> Result<()> {
+        self.scales().map(drop)
     }
 
     /// The descriptors, how many and where.
@@ -252,8 +323,13 @@ impl MapFile {
         &self.rows
     }
 
-    pub(super) fn stored_digests(&self) -> &[u8] {
+    pub(super) fn digests(&self) -> &[u8] {
         &self.digests
+    }
+
+    /// Reads a tensor other than the descriptors.
+    pub(super) fn read_tensor_unchecked(&self, name: &str) -> Result<Vec<u8>> {
+        checks::read_tensor(&self.path, &self.file, &self.header, name)
     }
 
     fn mapped(&self, bytes: &Range<u64>) -> Option<&[u8]> {
@@ -269,14 +345,6 @@ impl MapFile {
 
     fn read_at(&self, buffer: &mut [u8], start: u64) -> Result<()> {
         access::read_exact_at(&self.file, buffer, start).map_err(Error::io(&self.path))
-    }
-
-    /// Reads and checks a tensor other than the descriptors.
-    pub(super) fn read_tensor(&self, name: &str) -> Result<Vec<u8>> {
-        let (path, header) = (&self.path, &self.header);
-        let bytes = checks::read_tensor(path, &self.file, header, name)?;
-        checks::check_tensor_digests(path, header, &self.rows, &self.digests, name, &bytes)?;
-        Ok(bytes)
     }
 
     /// The factor of every row of an int8 map; empty for other types.
@@ -317,100 +385,5 @@ impl RowSource for MapFile {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::fs;
-
-    use ndarray::array;
-
-    use super::*;
-    use crate::{
-        PlanarPosition, Pose, Poses,
-        map::{MapWriter, Names},
-    };
-
-    fn write(path: &Path, row_type: RowType, n: usize) -> Map {
-        let descriptors = Array2::from_shape_fn((n, 5), |(row, column)| {
-            f32::from(u16::try_from(row * 31 + column * 7).unwrap()).sin()
-        });
-        let poses = (0..n).map(|row| {
-            let angle = row as f64 * 0.1;
-            Pose::new([row as f64, 2.0, -1.5].into(), [0.1, angle, 0.3].into())
-        });
-        let map = Map::new(Descriptors::new(descriptors).unwrap(), Poses::SixDof(poses.collect()));
-        let map = map.unwrap();
-        let names: Names = (0..n).map(|row| format!("frame-{row:06}.png")).collect();
-        let mut writer = MapWriter::create(path, 5, row_type, About::default()).unwrap();
-        writer.append(map.descriptors().view(), Some(map.poses()), Some(&names)).unwrap();
-        writer.finish().unwrap();
-        map
-    }
-
-    #[test]
-    fn what_is_written_is_read_bit_by_bit() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("map.safetensors");
-        let map = write(&path, RowType::F32, 100);
-        for access in [Access::Mapped, Access::Read] {
-            let file = MapFile::open_with(&path, Opening { access, trust: false }).unwrap();
-            assert_eq!(file.to_map().unwrap(), map);
-            assert_eq!(file.names().unwrap().unwrap().get(99), Some("frame-000099.png"));
-            assert_eq!(file.rows_in_place(0..1).unwrap().is_some(), access == Access::Mapped);
-        }
-    }
-
-    #[test]
-    fn smaller_rows_stay_close() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("map.safetensors");
-        for (row_type, tolerance) in [(RowType::F16, 1.0 / 2048.0), (RowType::I8, 0.5001 / 127.0)] {
-            let map = write(&path, row_type, 33);
-            let stored = MapFile::open(&path).unwrap().descriptors().unwrap();
-            for (stored, exact) in stored.view().iter().zip(map.descriptors().view()) {
-                assert!((stored - exact).abs() <= tolerance, "{row_type}: {exact} became {stored}");
-            }
-        }
-    }
-
-    #[test]
-    fn damage_is_found_when_it_is_touched_unless_trusted() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("map.safetensors");
-        write(&path, RowType::F32, 100);
-        let mut bytes = fs::read(&path).unwrap();
-        bytes[layout::ALIGNMENT + 70] ^= 1;
-        fs::write(&path, &bytes).unwrap();
-        let err = MapFile::open(&path).unwrap().descriptors().unwrap_err().to_string();
-        assert!(
-            err.contains("descriptors, rows 0..100: the bytes do not have the digest"),
-            "{err}"
-        );
-        let opening = Opening { trust: true, ..Opening::default() };
-        MapFile::open_with(&path, opening).unwrap().descriptors().unwrap();
-    }
-
-    #[test]
-    fn an_open_map_stays_when_the_file_is_replaced() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("map.safetensors");
-        let old = write(&path, RowType::F32, 10);
-        let file = MapFile::open(&path).unwrap();
-        write(&path, RowType::F32, 20);
-        assert_eq!(file.to_map().unwrap(), old);
-        assert_eq!(MapFile::open(&path).unwrap().len(), 20);
-    }
-
-    #[test]
-    fn descriptors_alone_are_a_map_file_without_poses() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("map.safetensors");
-        let mut writer = MapWriter::create(&path, 2, RowType::F32, About::default()).unwrap();
-        writer.append(array![[1.0, 2.0]].view(), None, None).unwrap();
-        let poses = Poses::Planar(vec![PlanarPosition::origin()]);
-        let err = writer.append(array![[1.0, 2.0]].view(), Some(&poses), None).unwrap_err();
-        assert!(matches!(err, Error::Mismatch { .. }), "{err}");
-        writer.finish().unwrap();
-        let file = MapFile::open(&path).unwrap();
-        assert_eq!((file.poses().unwrap(), file.names().unwrap()), (None, None));
-        assert!(matches!(file.to_map(), Err(Error::PoseKind { .. })));
-    }
-}
+#[path = "file_tests.rs"]
+mod tests;

@@ -14,6 +14,7 @@ mod replace;
 mod row_type;
 mod segments;
 mod touch;
+mod verify;
 mod writer;
 
 pub use about::{About, Coordinates, ImageSize, UtmZone};
@@ -25,6 +26,7 @@ pub use open_map::{OpenMap, merge};
 pub use replace::{NewFile, replace};
 pub use row_type::RowType;
 pub use segments::GrowingMap;
+pub use verify::verify;
 pub use writer::{MapWriter, write};
 
 use crate::{Descriptors, Error, Poses, Result};

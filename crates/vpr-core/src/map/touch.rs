@@ -41,23 +41,31 @@ impl Touched {
     }
 }
 
-/// Checks the bytes of one block of descriptors: their digest, and that every value is finite.
-pub(super) fn check_rows(
+/// The bytes of these rows have the digest they were written with.
+pub(super) fn check_digest(
+    path: &Path,
+    rows: &Range<usize>,
+    bytes: &[u8],
+    stored: &[u8],
+) -> Result<()> {
+    if BlockDigest::of(bytes).to_bytes() == stored {
+        return Ok(());
+    }
+    let place = format!("descriptors, rows {}..{}", rows.start, rows.end);
+    Err(Error::format(path, place, damaged()))
+}
+
+/// Every value of these rows is finite.
+pub(super) fn check_finite(
     path: &Path,
     rows: &Rows,
-    block: usize,
+    range: &Range<usize>,
     bytes: &[u8],
-    expected: &[u8],
 ) -> Result<()> {
-    if BlockDigest::of(bytes).to_bytes() != expected {
-        let Range { start, end } = rows.block(block);
-        let place = format!("descriptors, rows {start}..{end}");
-        return Err(Error::format(path, place, damaged()));
-    }
     match rows.row_type.first_not_finite(bytes) {
         None => Ok(()),
         Some(value) => {
-            let row = rows.block(block).start + value / rows.dim;
+            let row = range.start + value / rows.dim;
             let place = format!("descriptors, row {row}, column {}", value % rows.dim);
             Err(Error::format(path, place, "is not a finite number"))
         }
