@@ -21,6 +21,7 @@
 //! unless named so; a lower distance is nearer, a higher similarity or confidence is more certain;
 //! ties break by lower index; every result is the same for any number of threads.
 
+pub mod dataset;
 mod definition;
 mod descriptors;
 mod error;
@@ -28,6 +29,8 @@ mod ground_truth;
 pub mod knn;
 pub mod map;
 pub mod metrics;
+pub mod npy;
+pub mod pickle;
 mod pose;
 mod ranking;
 mod retrieval;
