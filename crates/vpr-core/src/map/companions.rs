@@ -25,7 +25,8 @@ impl MapFile {
     /// [`Error::Format`] if they are damaged, [`Error::NotFinite`] if one is not finite.
     pub fn poses(&self) -> Result<Option<Poses>> {
         let poses = self.poses_from(|name| Ok(doubles(&self.read_tensor(name)?)))?;
-        poses.as_ref().map(Poses::check_finite).transpose()?;
+        let finite = poses.as_ref().map(Poses::check_finite).transpose();
+        finite.map_err(|err| err.in_file(self.path()))?;
         Ok(poses)
     }
 

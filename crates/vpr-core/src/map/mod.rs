@@ -5,6 +5,7 @@ mod access;
 mod checks;
 mod companions;
 mod digest;
+pub mod door;
 mod file;
 mod header;
 mod layout;
@@ -14,6 +15,7 @@ mod replace;
 mod row_type;
 mod segments;
 mod touch;
+mod utm;
 mod verify;
 mod writer;
 
@@ -26,6 +28,7 @@ pub use open_map::{OpenMap, merge};
 pub use replace::{NewFile, replace};
 pub use row_type::RowType;
 pub use segments::GrowingMap;
+pub use utm::LatLon;
 pub use verify::verify;
 pub use writer::{MapWriter, write};
 

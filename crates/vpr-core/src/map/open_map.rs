@@ -25,7 +25,7 @@ impl OpenMap {
     ///
     /// # Errors
     ///
-    /// Those of [`MapFile::open_with`], [`Error::Empty`] if a growing map has no segment yet.
+    /// Those of [`MapFile::open_with`], [`Error::Format`] if a growing map has no segment yet.
     pub fn open(path: &Path, opening: Opening) -> Result<Self> {
         let segments = if path.is_dir() {
             let manifest = Manifest::read(path)?;
@@ -34,13 +34,14 @@ impl OpenMap {
         } else {
             vec![MapFile::open_with(path, opening)?]
         };
-        let about = segments.first().ok_or(Error::Empty("segments in the map"))?.about().clone();
+        let none = || Error::format(path, "manifest", "the map has no segment yet");
+        let about = segments.first().ok_or_else(none)?.about().clone();
         let mut starts = vec![0];
         for file in &segments {
             let (expected, actual) = (segments[0].dim(), file.dim());
             if expected != actual {
                 let what = "dimension of the segments";
-                return Err(Error::Mismatch { what, expected, actual });
+                return Err(Error::Mismatch { what, expected, actual }.in_file(path));
             }
             starts.push(starts[starts.len() - 1] + file.len());
         }

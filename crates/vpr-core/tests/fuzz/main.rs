@@ -1,0 +1,129 @@
+//! Every parser of bytes from outside, against damaged files: an error in one line that names the
+//! file, never a panic, never more memory than the file's size justifies.
+//!
+//! Runs on the stable compiler: deterministic mutations of a corpus that is kept here, and grows by
+//! every input that ever failed. `VPR_FUZZ_ROUNDS` sets how many inputs each format gets.
+
+mod mutate;
+mod targets;
+
+use std::{
+    fs,
+    panic::{self, AssertUnwindSafe},
+    path::{Path, PathBuf},
+};
+
+use peak_alloc::PeakAlloc;
+use rand::SeedableRng as _;
+use rand_chacha::ChaCha8Rng;
+use targets::{TARGETS, Target};
+
+#[global_allocator]
+static MEMORY: PeakAlloc = PeakAlloc;
+
+/// Inputs per format; half are plain truncations and bit flips, half are wilder.
+const ROUNDS: usize = 2000;
+/// Memory a parser may use whatever the file: buffers, tables of decoders.
+const FIXED_BYTES: usize = 3 << 20;
+/// Memory per byte of the file: a line of two letters becomes names, poses and errors.
+const BYTES_PER_BYTE: usize = 600;
+
+fn corpus() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus")
+}
+
+/// The seeds of a format, in the order of their names.
+fn seeds(target: &Target) -> Vec<Vec<u8>> {
+    let folder = corpus().join(target.name);
+    let mut files: Vec<PathBuf> = fs::read_dir(&folder)
+        .unwrap_or_else(|err| panic!("{}: {err}", folder.display()))
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    files.sort();
+    assert!(!files.is_empty(), "no seed for {}", target.name);
+    files.iter().map(|file| fs::read(file).unwrap()).collect()
+}
+
+/// What went wrong with one input, if anything.
+fn try_one(target: &Target, place: &Path, input: &[u8]) -> Option<String> {
+    fs::write(place.join(target.file), input).unwrap();
+    let before = MEMORY.current_usage();
+    MEMORY.reset_peak_usage();
+    let outcome = panic::catch_unwind(AssertUnwindSafe(|| (target.read)(place)));
+    let used = MEMORY.peak_usage().saturating_sub(before);
+    let Ok(problems) = outcome else { return Some("panicked".to_owned()) };
+    let allowed = FIXED_BYTES + BYTES_PER_BYTE * input.len();
+    if used > allowed {
+        return Some(format!("used {used} bytes for a file of {}", input.len()));
+    }
+    let place = place.to_string_lossy();
+    let unclear = |message: &String| message.contains('\n') || !message.contains(&*place);
+    problems.iter().map(ToString::to_string).find(unclear).map(|it| format!("unclear: {it}"))
+}
+
+/// Keeps an input that failed, so that it is tried first from now on.
+fn keep(target: &Target, input: &[u8]) -> PathBuf {
+    let digest = vpr_core::map::BlockDigest::of(input).to_hex();
+    let file = corpus().join(target.name).join(format!("found-{}", &digest[..12]));
+    fs::write(&file, input).unwrap();
+    file
+}
+
+fn fuzz(target: &Target, rounds: usize) -> Result<usize, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path();
+    fs::create_dir_all(place.join(target.file).parent().unwrap()).unwrap();
+    let seeds = seeds(target);
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    let mut n_refused = 0;
+    let failed = |input: &[u8], reason: String| {
+        Err(format!("{}: {reason}; kept as {}", target.name, keep(target, input).display()))
+    };
+    for seed in &seeds {
+        if let Some(reason) = try_one(target, place, seed) {
+            return failed(seed, reason);
+        }
+    }
+    for round in 0..rounds {
+        let seed = &seeds[round % seeds.len()];
+        let input = match round % 4 {
+            0 => mutate::truncated(seed, &mut rng),
+            1 => mutate::bit_flipped(seed, &mut rng),
+            _ => mutate::mangled(seed, &seeds, &mut rng),
+        };
+        if let Some(reason) = try_one(target, place, &input) {
+            return failed(&input, reason);
+        }
+        let noticed = !(target.read)(place).is_empty();
+        if target.notices_all && round % 4 < 2 && !noticed && input != *seed {
+            return failed(&input, "damage went unnoticed".to_owned());
+        }
+        n_refused += usize::from(noticed);
+    }
+    Ok(n_refused)
+}
+
+#[test]
+fn damaged_files_are_refused_in_one_line_and_in_little_memory() {
+    let rounds = std::env::var("VPR_FUZZ_ROUNDS").ok().and_then(|text| text.parse().ok());
+    let rounds = rounds.unwrap_or(ROUNDS);
+    // A panic is counted, not printed thousands of times.
+    panic::set_hook(Box::new(|_| {}));
+    let outcomes: Vec<_> = TARGETS.iter().map(|target| (target, fuzz(target, rounds))).collect();
+    let _ = panic::take_hook();
+    let mut failures = Vec::new();
+    for (target, outcome) in outcomes {
+        match outcome {
+            Ok(n_refused) => eprintln!("{}: {n_refused} of {rounds} refused", target.name),
+            Err(reason) => failures.push(reason),
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// Makes the seeds anew: `cargo test -p vpr-core --test fuzz -- --ignored write_the_seeds`.
+#[test]
+#[ignore = "writes into the source tree"]
+fn write_the_seeds() {
+    targets::write_seeds(&corpus());
+}
