@@ -21,10 +21,14 @@
 //! unless named so; a lower distance is nearer, a higher similarity or confidence is more certain;
 //! ties break by lower index; every result is the same for any number of threads.
 
+#[cfg(feature = "cli")]
+pub mod cli;
 pub mod dataset;
 mod definition;
 mod descriptors;
 mod error;
+pub mod experiment;
+pub mod figure;
 mod ground_truth;
 pub mod knn;
 pub mod map;
@@ -35,6 +39,7 @@ mod pose;
 mod ranking;
 mod retrieval;
 mod scores;
+pub mod table;
 
 pub use definition::Definition;
 pub use descriptors::Descriptors;
