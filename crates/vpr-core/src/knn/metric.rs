@@ -41,7 +41,8 @@ impl Metric {
             Self::Cosine => {
                 let product = sum(query, reference, |q, x| q * x);
                 let norms = (squared_norm(query) * squared_norm(reference)).sqrt();
-                if norms > 0.0 { (1.0 - product / norms).clamp(0.0, 2.0) } else { 1.0 }
+                // NaN stays NaN, so that it is found.
+                if norms == 0.0 { 1.0 } else { (1.0 - product / norms).clamp(0.0, 2.0) }
             }
         }
     }
