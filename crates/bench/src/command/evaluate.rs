@@ -8,13 +8,20 @@ use clap::ValueEnum;
 use vpr_core::{
     Descriptors, GroundTruth, Poses, Ranking,
     cli::{self, Outcome},
-    dataset::layout::{pose_csv::PoseTable, utm_names::UtmFolder, vpr_bench::{GroundTruthFile, image_folder}},
+    dataset::layout::{
+        pose_csv::PoseTable,
+        utm_names::UtmFolder,
+        vpr_bench::{GroundTruthFile, image_folder},
+    },
     metrics::recall_at,
     npy, retrieve,
 };
 use vpr_vision::{cohog::CoHogParams, hog::HogParams};
 
-use super::{predictions::{self, Named}, run::Bar};
+use super::{
+    predictions::{self, Named},
+    run::Bar,
+};
 
 /// The flags of VPR-methods-evaluation, in kebab case; the names with underscores work too.
 #[derive(clap::Args)]
@@ -29,10 +36,21 @@ pub(crate) struct EvaluateArgs {
     #[arg(long, value_enum, default_value_t = Method::Hog)]
     method: Method,
     /// Descriptors of the references, one row each: .npy, float32
-    #[arg(long, alias = "database_descriptors", value_name = "NPY", requires = "queries_descriptors", conflicts_with = "database_folder")]
+    #[arg(
+        long,
+        alias = "database_descriptors",
+        value_name = "NPY",
+        requires = "queries_descriptors",
+        conflicts_with = "database_folder"
+    )]
     database_descriptors: Option<PathBuf>,
     /// Descriptors of the queries
-    #[arg(long, alias = "queries_descriptors", value_name = "NPY", requires = "database_descriptors")]
+    #[arg(
+        long,
+        alias = "queries_descriptors",
+        value_name = "NPY",
+        requires = "database_descriptors"
+    )]
     queries_descriptors: Option<PathBuf>,
     /// Poses of the references: CSV with a header
     #[arg(long, alias = "database_poses", value_name = "CSV", requires = "queries_poses")]
@@ -151,7 +169,9 @@ fn from_folders(
 fn from_descriptors(args: &EvaluateArgs, k: usize) -> anyhow::Result<Retrieved> {
     let (Some(references), Some(queries)) = (&args.database_descriptors, &args.queries_descriptors)
     else {
-        bail!("give --database-folder and --queries-folder, or --database-descriptors and --queries-descriptors");
+        bail!(
+            "give --database-folder and --queries-folder, or --database-descriptors and --queries-descriptors"
+        );
     };
     let read = |path: &PathBuf| -> anyhow::Result<Descriptors> {
         Descriptors::new(npy::read_f32(path)?).with_context(|| path.display().to_string())
@@ -194,7 +214,9 @@ fn truth(args: &EvaluateArgs, retrieved: &Retrieved) -> anyhow::Result<GroundTru
         return Ok(truth);
     }
     let (Some(query_poses), Some(reference_poses)) = (&queries.poses, &references.poses) else {
-        bail!("no positions: give --database-poses and --queries-poses, --ground-truth, or --no-labels");
+        bail!(
+            "no positions: give --database-poses and --queries-poses, --ground-truth, or --no-labels"
+        );
     };
     ensure!(
         queries.zone == references.zone,
@@ -210,7 +232,8 @@ impl Named {
     /// asked for.
     fn folder(folder: &Path, needs_positions: bool) -> anyhow::Result<Self> {
         if !needs_positions {
-            let names = image_folder(folder).or_else(|_| UtmFolder::open(folder).map(|it| it.images))?;
+            let names =
+                image_folder(folder).or_else(|_| UtmFolder::open(folder).map(|it| it.images))?;
             return Ok(Self { names, poses: None, zone: String::new() });
         }
         let images = UtmFolder::open(folder)?;

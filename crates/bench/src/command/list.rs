@@ -69,7 +69,9 @@ fn datasets(data: &Data) -> Vec<String> {
 
 fn metrics() -> Vec<String> {
     let line = |metric: &vpr_core::metrics::catalogue::MetricInfo| {
-        format!("{:<24}{:<30}{}", metric.id, metric.name, metric.functions.join(", ")).trim_end().to_owned()
+        format!("{:<24}{:<30}{}", metric.id, metric.name, metric.functions.join(", "))
+            .trim_end()
+            .to_owned()
     };
     CATALOGUE.iter().map(line).collect()
 }

@@ -61,9 +61,11 @@ fn prediction(
     n: usize,
 ) -> String {
     let name = |index: &usize| retrieved.references.names[*index].display().to_string();
-    let predicted: Vec<String> = retrieved.ranking.indices(query).iter().take(n).map(name).collect();
+    let predicted: Vec<String> =
+        retrieved.ranking.indices(query).iter().take(n).map(name).collect();
     let query_name = retrieved.queries.names[query].display();
-    let mut text = format!("Query path:\n{query_name}\n\nPredictions paths:\n{}\n", predicted.join("\n"));
+    let mut text =
+        format!("Query path:\n{query_name}\n\nPredictions paths:\n{}\n", predicted.join("\n"));
     if let Some(truth) = truth {
         let positives: Vec<String> = truth.correct(query).iter().map(name).collect();
         // Writing to a string cannot fail.

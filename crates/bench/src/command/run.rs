@@ -10,7 +10,7 @@ use bench::{
     study::{self, Context, Observer, Study},
 };
 use vpr_core::{
-    cli::{self, DataArgs, OutputArgs, Outcome},
+    cli::{self, DataArgs, Outcome, OutputArgs},
     experiment,
 };
 

@@ -2,6 +2,8 @@
 
 use std::{collections::BTreeMap, fmt, str::FromStr};
 
+use crate::knn::Metric;
+
 /// What is known of how a map was made; everything is optional, nothing is guessed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct About {
@@ -14,7 +16,7 @@ pub struct About {
     /// How images were resized: `bilinear`, `bicubic`, with or without antialiasing.
     pub interpolation: Option<String>,
     /// The distance the descriptors were made for.
-    pub metric: Option<String>,
+    pub metric: Option<Metric>,
     /// What the numbers of the positions mean.
     pub coordinates: Option<Coordinates>,
 }
@@ -61,7 +63,7 @@ impl About {
             (WEIGHTS, self.weights_digest.clone()),
             (SIZE, self.image_size.map(|size| size.to_string())),
             (INTERPOLATION, self.interpolation.clone()),
-            (METRIC, self.metric.clone()),
+            (METRIC, self.metric.map(|metric| metric_name(metric).to_owned())),
             (COORDINATES, self.coordinates.map(|coordinates| coordinates.to_string())),
         ];
         for (key, value) in entries {
@@ -90,10 +92,40 @@ impl About {
             weights_digest: text(WEIGHTS),
             image_size: typed(metadata, SIZE)?,
             interpolation: text(INTERPOLATION),
-            metric: text(METRIC),
+            metric: metadata
+                .get(METRIC)
+                .map(|text| parse_metric(text))
+                .transpose()
+                .map_err(|reason| (format!("metadata `{METRIC}`"), reason))?,
             coordinates: typed(metadata, COORDINATES)?,
         })
     }
+}
+
+/// All metrics, by the names that files and flags have for them.
+const METRICS: [(&str, Metric); 4] = [
+    ("euclidean", Metric::Euclidean),
+    ("cosine", Metric::Cosine),
+    ("inner-product", Metric::InnerProduct),
+    ("manhattan", Metric::Manhattan),
+];
+
+/// The name of a metric in files and flags.
+#[must_use]
+pub fn metric_name(metric: Metric) -> &'static str {
+    METRICS.iter().find(|(_, other)| *other == metric).map_or("", |(name, _)| name)
+}
+
+/// The metric of this name.
+///
+/// # Errors
+///
+/// That there is none, and which there are.
+pub fn parse_metric(text: &str) -> Result<Metric, String> {
+    METRICS.iter().find(|(name, _)| *name == text).map(|(_, metric)| *metric).ok_or_else(|| {
+        let known = METRICS.map(|(name, _)| name).join(", ");
+        format!("`{}` is none of {known}", super::header::shorten(text))
+    })
 }
 
 impl fmt::Display for ImageSize {
@@ -176,6 +208,7 @@ mod tests {
         let about = About {
             encoder: Some("NetVLAD".to_owned()),
             image_size: Some(ImageSize { width: 640, height: 480 }),
+            metric: Some(Metric::InnerProduct),
             coordinates: Some(Coordinates::Utm(UtmZone { number: 32, south: true })),
             ..About::default()
         };

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{About, Map, MapFile, MapWriter, Names, Opening, RowType, layout, segments::Manifest};
+use super::{About, Map, MapFile, Names, Opening, RowType, segments::Manifest};
 use crate::{Descriptors, Error, Poses, Result, knn::RowSource};
 
 /// A map on disk, open for reading: one file, or all segments of a folder as one sequence of rows.
@@ -201,49 +201,15 @@ impl RowSource for OpenMap {
     }
 }
 
-/// Writes several maps, one after the other, as one file; rows are copied as they are stored.
-///
-/// Needs memory for one block of rows and for what is small per image. Returns the number of rows.
-///
-/// # Errors
-///
-/// Those of [`MapWriter`], [`Error::Parameter`] if the maps differ in row type, encoder, metric or
-/// coordinate system.
-pub fn merge(maps: &[OpenMap], target: &Path) -> Result<usize> {
-    let first = maps.first().ok_or(Error::Empty("maps to merge"))?;
-    let files: Vec<&MapFile> = maps.iter().flat_map(|map| &map.segments).collect();
-    for file in &files {
-        let same = file.row_type() == first.row_type() && *file.about() == first.about;
-        if !same {
-            return Err(Error::Parameter {
-                name: "maps",
-                value: file.path().display().to_string(),
-                reason: "must have the row type and the description of the first",
-            });
-        }
-    }
-    let about = first.about.clone();
-    let mut writer = MapWriter::create(target, first.dim(), first.row_type(), about)?;
-    for file in files {
-        let (poses, names) = (file.poses()?, file.names()?);
-        writer.begin(file.len(), poses.as_ref(), names.as_ref())?;
-        let per_block = layout::rows_per_block(file.dim() * file.row_type().size());
-        for start in (0..file.len()).step_by(per_block) {
-            let rows = start..(start + per_block).min(file.len());
-            file.with_stored(rows, |bytes, scales| writer.push_stored(bytes, scales))?;
-        }
-    }
-    let n_rows = writer.len();
-    writer.finish()?;
-    Ok(n_rows)
-}
-
 #[cfg(test)]
 mod tests {
     use ndarray::Array2;
 
     use super::*;
-    use crate::{PlanarPosition, map::GrowingMap};
+    use crate::{
+        PlanarPosition,
+        map::{GrowingMap, merge},
+    };
 
     fn rows(n: usize, seed: usize) -> Array2<f32> {
         Array2::from_shape_fn((n, 3), |(row, column)| ((seed + row * 3 + column) as f32).sin())

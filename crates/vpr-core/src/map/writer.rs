@@ -92,6 +92,11 @@ impl MapWriter {
             return Err(Error::Mismatch { what, expected, actual: descriptors.ncols() });
         }
         self.begin(descriptors.nrows(), poses, names)?;
+        self.push_rows(descriptors)
+    }
+
+    /// Adds rows whose poses and names have been given to [`Self::begin`].
+    pub(super) fn push_rows(&mut self, descriptors: ArrayView2<'_, f32>) -> Result<()> {
         let mut contiguous = vec![0.0; self.rows.dim];
         for row in descriptors.outer_iter() {
             if let Some(row) = row.as_slice() {

@@ -6,6 +6,7 @@
 
 mod convention;
 mod format;
+mod guess;
 mod hdf5;
 mod hloc_pairs;
 mod hloc_poses;
