@@ -50,3 +50,8 @@ pub use pose::{PlanarPosition, Pose, Poses, Position};
 pub use ranking::Ranking;
 pub use retrieval::{Retrieval, retrieve};
 pub use scores::{BestMatches, Similarities};
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -17,7 +17,7 @@ use crate::{Error, Result, knn::RowSource as _};
 /// coordinate system.
 pub fn merge(maps: &[OpenMap], target: &Path) -> Result<usize> {
     let first = maps.first().ok_or(Error::Empty("maps to merge"))?;
-    let files: Vec<&MapFile> = maps.iter().flat_map(|map| map.segments()).collect();
+    let files: Vec<&MapFile> = maps.iter().flat_map(OpenMap::segments).collect();
     for file in &files {
         let same = file.row_type() == first.row_type() && *file.about() == *first.about();
         if !same {
@@ -51,6 +51,10 @@ pub fn merge(maps: &[OpenMap], target: &Path) -> Result<usize> {
 /// # Errors
 ///
 /// Those of [`MapWriter`] and of reading the map.
+///
+/// # Panics
+///
+/// Never: blocks are whole rows.
 pub fn copy_as(map: &OpenMap, row_type: RowType, target: &Path) -> Result<usize> {
     let mut writer = MapWriter::create(target, map.dim(), row_type, map.about().clone())?;
     writer.begin(map.len(), map.poses()?.as_ref(), map.names()?.as_ref())?;

@@ -60,10 +60,12 @@ impl Strictness<'_> {
         None
     }
 
-    /// The value of a check, or `Some(None)` if it failed and opening may go on nevertheless.
-    fn pass<T>(&mut self, result: Result<T>) -> Option<Option<T>> {
-        let value = self.need(result);
-        if value.is_none() && matches!(self, Self::StopAt(_)) { None } else { Some(value) }
+    /// Whether opening may go on after a check.
+    fn may_pass(&mut self, check: Result<()>) -> Option<()> {
+        match (self.need(check), self) {
+            (None, Self::StopAt(_)) => None,
+            _ => Some(()),
+        }
     }
 }
 
@@ -117,7 +119,7 @@ impl MapFile {
         let file = strictness.need(File::open(path).map_err(Error::io(path)))?;
         let (header, json) = strictness.need(Header::read(path, &file))?;
         strictness.need(checks::check_format(path, &header))?;
-        strictness.pass(checks::check_header(path, &header, &json))?;
+        strictness.may_pass(checks::check_header(path, &header, &json))?;
         let rows = strictness.need(Rows::of(path, &header))?;
         for (name, entry) in &header.tensors {
             strictness.need(checks::check_tensor(path, &header, &rows, name, entry))?;
@@ -125,10 +127,14 @@ impl MapFile {
         strictness.need(checks::check_companions(path, &header, &rows))?;
         let about = About::read_from(&header.metadata)
             .map_err(|(place, reason)| Error::format(path, place, reason));
-        let about = strictness.pass(about)?.unwrap_or_default();
+        let (about, understood) = match about {
+            Ok(about) => (about, Ok(())),
+            Err(err) => (About::default(), Err(err)),
+        };
+        strictness.may_pass(understood)?;
         let digests = checks::read_tensor(path, &file, &header, layout::DIGESTS);
         let digests = strictness.need(digests)?;
-        strictness.pass(checks::check_digests(path, &header, &digests))?;
+        strictness.may_pass(checks::check_digests(path, &header, &digests))?;
         strictness.need(checks::check_n_digests(path, &header, &rows, &digests))?;
         let map = match opening.access {
             Access::Mapped => Some(strictness.need(access::map(&file).map_err(Error::io(path)))?),

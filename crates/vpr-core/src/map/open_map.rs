@@ -95,6 +95,10 @@ impl OpenMap {
     /// # Errors
     ///
     /// Those of [`MapFile::read_rows`].
+    ///
+    /// # Panics
+    ///
+    /// Never: there are as many values as rows and columns.
     pub fn descriptors(&self) -> Result<Descriptors> {
         let mut values = vec![0.0; self.len() * self.dim()];
         self.copy_rows(0..self.len(), &mut values)?;

@@ -44,21 +44,32 @@ fn seeds(target: &Target) -> Vec<Vec<u8>> {
     files.iter().map(|file| fs::read(file).unwrap()).collect()
 }
 
-/// What went wrong with one input, if anything.
-fn try_one(target: &Target, place: &Path, input: &[u8]) -> Option<String> {
+/// What became of one input.
+struct Outcome {
+    /// Whether the parser found anything wrong.
+    noticed: bool,
+    /// The most memory it had.
+    used: usize,
+}
+
+/// Gives one input to a parser; why that is wrong, if it is.
+fn try_one(target: &Target, place: &Path, input: &[u8]) -> Result<Outcome, String> {
     fs::write(place.join(target.file), input).unwrap();
     let before = MEMORY.current_usage();
     MEMORY.reset_peak_usage();
     let outcome = panic::catch_unwind(AssertUnwindSafe(|| (target.read)(place)));
     let used = MEMORY.peak_usage().saturating_sub(before);
-    let Ok(problems) = outcome else { return Some("panicked".to_owned()) };
+    let problems = outcome.map_err(|_| "panicked".to_owned())?;
     let allowed = FIXED_BYTES + BYTES_PER_BYTE * input.len();
     if used > allowed {
-        return Some(format!("used {used} bytes for a file of {}", input.len()));
+        return Err(format!("used {used} bytes for a file of {}", input.len()));
     }
     let place = place.to_string_lossy();
     let unclear = |message: &String| message.contains('\n') || !message.contains(&*place);
-    problems.iter().map(ToString::to_string).find(unclear).map(|it| format!("unclear: {it}"))
+    match problems.iter().map(ToString::to_string).find(unclear) {
+        Some(message) => Err(format!("unclear: {message:?}")),
+        None => Ok(Outcome { noticed: !problems.is_empty(), used }),
+    }
 }
 
 /// Keeps an input that failed, so that it is tried first from now on.
@@ -69,18 +80,19 @@ fn keep(target: &Target, input: &[u8]) -> PathBuf {
     file
 }
 
-fn fuzz(target: &Target, rounds: usize) -> Result<usize, String> {
+/// How many of the inputs were refused, and the most memory that one of them took.
+fn fuzz(target: &Target, rounds: usize) -> Result<(usize, usize), String> {
     let folder = tempfile::tempdir().unwrap();
     let place = folder.path();
     fs::create_dir_all(place.join(target.file).parent().unwrap()).unwrap();
     let seeds = seeds(target);
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let mut n_refused = 0;
-    let failed = |input: &[u8], reason: String| {
+    let (mut n_refused, mut most) = (0, 0);
+    let failed = |input: &[u8], reason: String| -> Result<_, String> {
         Err(format!("{}: {reason}; kept as {}", target.name, keep(target, input).display()))
     };
     for seed in &seeds {
-        if let Some(reason) = try_one(target, place, seed) {
+        if let Err(reason) = try_one(target, place, seed) {
             return failed(seed, reason);
         }
     }
@@ -91,16 +103,17 @@ fn fuzz(target: &Target, rounds: usize) -> Result<usize, String> {
             1 => mutate::bit_flipped(seed, &mut rng),
             _ => mutate::mangled(seed, &seeds, &mut rng),
         };
-        if let Some(reason) = try_one(target, place, &input) {
-            return failed(&input, reason);
-        }
-        let noticed = !(target.read)(place).is_empty();
+        let Outcome { noticed, used } = match try_one(target, place, &input) {
+            Ok(outcome) => outcome,
+            Err(reason) => return failed(&input, reason),
+        };
         if target.notices_all && round % 4 < 2 && !noticed && input != *seed {
             return failed(&input, "damage went unnoticed".to_owned());
         }
         n_refused += usize::from(noticed);
+        most = most.max(used);
     }
-    Ok(n_refused)
+    Ok((n_refused, most))
 }
 
 #[test]
@@ -114,7 +127,7 @@ fn damaged_files_are_refused_in_one_line_and_in_little_memory() {
     let mut failures = Vec::new();
     for (target, outcome) in outcomes {
         match outcome {
-            Ok(n_refused) => eprintln!("{}: {n_refused} of {rounds} refused", target.name),
+            Ok((n_refused, most)) => eprintln!("{}: {n_refused} of {rounds} refused", target.name),
             Err(reason) => failures.push(reason),
         }
     }

@@ -110,14 +110,22 @@ impl Format {
     #[must_use]
     pub fn kind(self) -> Kind {
         match self {
-            Self::Map | Self::Npy | Self::Npz | Self::Safetensors | Self::HlocH5 => {
-                Kind::Descriptors
-            }
-            Self::VprEvalQueries => Kind::Descriptors,
+            Self::Map
+            | Self::Npy
+            | Self::Npz
+            | Self::Safetensors
+            | Self::HlocH5
+            | Self::VprEvalQueries => Kind::Descriptors,
             Self::VprEval => Kind::DescriptorsAndPairs,
             Self::HlocPairs => Kind::Pairs,
-            Self::HlocPoses | Self::Kapture | Self::Tum | Self::Kitti => Kind::Poses,
-            Self::SevenScenes | Self::LatLon | Self::PoseCsv | Self::UtmNames => Kind::Poses,
+            Self::HlocPoses
+            | Self::Kapture
+            | Self::Tum
+            | Self::Kitti
+            | Self::SevenScenes
+            | Self::LatLon
+            | Self::PoseCsv
+            | Self::UtmNames => Kind::Poses,
         }
     }
 }

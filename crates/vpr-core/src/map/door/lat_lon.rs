@@ -41,7 +41,7 @@ pub(super) fn read(path: &Path) -> Read<Parts> {
         let record = match record {
             Ok(record) => record,
             Err(err) => {
-                wrong(&err).into_iter().for_each(|err| report.error(err));
+                report.errors(wrong(&err));
                 continue;
             }
         };
@@ -53,7 +53,9 @@ pub(super) fn read(path: &Path) -> Read<Parts> {
         if let Some((point, zone)) = report.keep(line, zone) {
             lines_of_zones.entry(zone).or_insert(line);
             points.push(point);
-            name.into_iter().for_each(|column| names.push(field(column)));
+            if let Some(column) = name {
+                names.push(field(column));
+            }
         }
     }
     if lines_of_zones.len() > 1 {

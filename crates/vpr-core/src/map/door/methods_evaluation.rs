@@ -38,7 +38,7 @@ pub(super) fn read_pairs(folder: &Path) -> Read<Pairs> {
     for file in files {
         match read_list(&file) {
             Ok(list) => pairs.lists.push(list),
-            Err(problems) => problems.into_iter().for_each(|err| report.error(err)),
+            Err(problems) => report.errors(problems),
         }
     }
     report.finish(pairs)
@@ -53,11 +53,8 @@ fn read_list(path: &Path) -> Read<PairList> {
         match content {
             "" => {}
             "Query path:" | "Predictions paths:" | "Positives paths:" => section = content,
-            name if section == "Query path:" => {
-                if query.replace(name.to_owned()).is_some() {
-                    report.line(line, "a second query");
-                }
-            }
+            _ if section == "Query path:" && query.is_some() => report.line(line, "a second query"),
+            name if section == "Query path:" => query = Some(name.to_owned()),
             name if section == "Predictions paths:" => references.push(name.to_owned()),
             _ if section.is_empty() => report.line(line, "expected `Query path:`"),
             _ => {}

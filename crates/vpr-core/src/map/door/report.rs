@@ -33,6 +33,11 @@ impl<'a> Report<'a> {
         self.problems.push(err);
     }
 
+    /// Notes several problems that have their own places.
+    pub(super) fn errors(&mut self, problems: Vec<Error>) {
+        self.problems.extend(problems);
+    }
+
     /// Keeps a value, or notes why there is none on this line.
     pub(super) fn keep<T>(&mut self, line: usize, result: Result<T, String>) -> Option<T> {
         result.map_err(|reason| self.line(line, reason)).ok()

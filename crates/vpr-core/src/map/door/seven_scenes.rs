@@ -33,7 +33,7 @@ pub(super) fn read(folder: &Path) -> Read<Parts> {
                 names.push(&format!("{frame}{IMAGE}"));
                 poses.push(pose);
             }
-            Err(problems) => problems.into_iter().for_each(|err| report.error(err)),
+            Err(problems) => report.errors(problems),
         }
     }
     let poses = Some(Poses::SixDof(poses));
