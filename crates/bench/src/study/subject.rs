@@ -108,8 +108,10 @@ pub(super) fn stored(id: &str, context: Context<'_>) -> Result<Vec<Subject>> {
 pub(super) fn measured(id: &str, context: Context<'_>) -> Result<Vec<Subject>> {
     let Some(dataset) = context.data.images(id)? else { return Ok(Vec::new()) };
     let provenance = context.data.provenance(id)?;
+    let remark = context.data.entry(id)?.note.clone();
     let subject = |(column, technique): (&'static str, HandCrafted)| {
         let (similarities, note) = match_images(&technique, column, &dataset, false, context)?;
+        let note = note.or_else(|| remark.clone());
         Ok(Subject {
             row: dataset.name.clone(),
             column,
