@@ -92,6 +92,22 @@ impl Retrieval {
         self.distances.row(query)
     }
 
+    /// The same ranks with other names: index `i` becomes `names[i]`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] if an index has no name.
+    pub fn with_indices(self, names: &[usize]) -> Result<Self> {
+        let mut renamed = Array2::zeros(self.distances.dim());
+        for (new, &index) in
+            renamed.iter_mut().zip((0..self.len()).flat_map(|query| self.ranking.indices(query)))
+        {
+            let len = names.len();
+            *new = *names.get(index).ok_or(Error::OutOfRange { what: "reference", index, len })?;
+        }
+        Self::new(renamed, self.distances)
+    }
+
     /// The reference at rank 1 of every query.
     #[must_use]
     pub fn best(&self) -> Vec<usize> {

@@ -118,7 +118,7 @@ proptest! {
         let references = random(&mut rng, n_rows, dim, value);
         let queries = random(&mut rng, n_queries, dim, value);
         for metric in METRICS {
-            let params = SearchParams { metric, k, block_bytes: 2048 };
+            let params = SearchParams { metric, k, block_rows: Some(20) };
             let found = search(&references, &queries, &params).unwrap();
             prop_assert_eq!(&found, &obvious(&references, &queries, metric, k), "{:?}", metric);
         }
@@ -144,7 +144,7 @@ proptest! {
         };
         let (references, queries) = (rows(n_rows), rows(n_queries));
         for metric in METRICS {
-            let params = SearchParams { metric, k, block_bytes: 4096 };
+            let params = SearchParams { metric, k, block_rows: Some(30) };
             let found = search(&references, &queries, &params).unwrap();
             prop_assert_eq!(&found, &rescored(&references, &queries, metric, k), "{:?}", metric);
         }
@@ -167,7 +167,7 @@ proptest! {
         };
         let (references, queries) = (near(n_rows), near(n_queries));
         for metric in METRICS {
-            let params = SearchParams { metric, k, block_bytes: 8192 };
+            let params = SearchParams { metric, k, block_rows: Some(70) };
             let found = search(&references, &queries, &params).unwrap();
             prop_assert_eq!(&found, &rescored(&references, &queries, metric, k), "{:?}", metric);
         }
@@ -188,8 +188,8 @@ proptest! {
         for metric in METRICS {
             let expected = rescored(&references, &queries, metric, k);
             for n_threads in [1, 2, 8] {
-                for block_bytes in [1, 1000, 20_000, 1 << 20] {
-                    let params = SearchParams { metric, k, block_bytes };
+                for block_rows in [Some(1), Some(7), Some(100), None] {
+                    let params = SearchParams { metric, k, block_rows };
                     let found = on_threads(n_threads, || search(&references, &queries, &params));
                     prop_assert_eq!(&found.unwrap(), &expected);
                     let found = on_threads(n_threads, || search(&copied, &queries, &params));
@@ -264,7 +264,7 @@ fn the_earliest_damage_is_reported_on_any_number_of_threads() {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
     let rows = Damaged { rows: random(&mut rng, 2000, 16, uniform), from: 700, silently: false };
     let queries = random(&mut rng, 5, 16, uniform);
-    let params = SearchParams { block_bytes: 640, ..SearchParams::default() };
+    let params = SearchParams { block_rows: Some(10), ..SearchParams::default() };
     for n_threads in [1, 2, 8] {
         let err = on_threads(n_threads, || search(&rows, &queries, &params)).unwrap_err();
         assert_eq!(err.to_string(), "map: row 700: digest differs");

@@ -88,7 +88,9 @@ impl Scorer {
             let margin = match batch.metric {
                 Metric::Euclidean | Metric::Manhattan => Margin::direct(batch.dim),
                 Metric::InnerProduct => {
-                    scores.iter_mut().for_each(|score| *score = -*score);
+                    for score in &mut *scores {
+                        *score = -*score;
+                    }
                     Margin::product(batch.dim, batch.norms[index], largest_norm(batch.dim, norms))
                 }
                 Metric::Cosine => {
@@ -125,7 +127,9 @@ impl Scorer {
         sums(self.arch, Sum::SquaredNorm, batch.query(0), block, &mut [], norms);
         let largest = largest_norm(dim, norms);
         if batch.metric == Metric::Cosine {
-            norms.iter_mut().for_each(|norm| *norm = weight(*norm));
+            for norm in &mut *norms {
+                *norm = weight(*norm);
+            }
         }
         for (index, scores) in self.scores.chunks_exact_mut(n_rows).enumerate() {
             let query_norm = batch.norms[index];

@@ -25,19 +25,22 @@ pub struct SearchParams {
     pub metric: Metric,
     /// How many references are wanted for every query.
     pub k: usize,
-    /// Bytes of references that a thread works on at a time, as f32. Changes the time, not the
-    /// result.
-    pub block_bytes: usize,
+    /// References that a thread reads at a time; `None` chooses by dimension. Changes the time, not
+    /// the result.
+    pub block_rows: Option<usize>,
 }
 
 impl Default for SearchParams {
     fn default() -> Self {
-        Self { metric: Metric::Euclidean, k: 10, block_bytes: 1 << 20 }
+        Self { metric: Metric::Euclidean, k: 10, block_rows: None }
     }
 }
 
 /// Queries that share one pass over the references; bounds the memory for scores and candidates.
 const QUERIES_PER_PASS: usize = 1024;
+
+/// Target size of a block.
+const BLOCK_BYTES: usize = 128 << 10;
 
 /// Finds the `k` references nearest to every query, exactly.
 ///
@@ -75,7 +78,7 @@ pub fn search(
         let len = QUERIES_PER_PASS.min(queries.len() - start);
         let values = &queries.as_slice()[start * queries.dim()..(start + len) * queries.dim()];
         let batch = Batch::new(params.metric, values, queries.dim(), len);
-        ranked.extend(pass(rows, &batch, k, params.block_bytes)?);
+        ranked.extend(pass(rows, &batch, k, params.block_rows)?);
     }
     let shape = (queries.len(), k);
     Retrieval::new(
@@ -91,10 +94,10 @@ fn pass(
     rows: &(impl RowSource + ?Sized),
     batch: &Batch<'_>,
     k: usize,
-    block_bytes: usize,
+    block_rows: Option<usize>,
 ) -> Result<Vec<Vec<(f64, usize)>>> {
     let n_threads = rayon::current_num_threads();
-    let blocks = Blocks::new(rows.len(), rows.dim(), block_bytes, n_threads);
+    let blocks = Blocks::new(rows.len(), rows.dim(), block_rows, n_threads);
     let workers: Vec<Worker> = (0..n_threads.min(blocks.count()))
         .into_par_iter()
         .with_max_len(1)
@@ -137,11 +140,13 @@ struct Blocks {
 }
 
 impl Blocks {
-    fn new(n_rows: usize, dim: usize, bytes: usize, n_threads: usize) -> Self {
-        let fitting = bytes / (size_of::<f32>() * dim.max(1));
+    fn new(n_rows: usize, dim: usize, wanted: Option<usize>, n_threads: usize) -> Self {
+        // Measured: panels of 64 rows suit the matrix product, and a block should stay in the
+        // cache next to the queries.
+        let fitting = (BLOCK_BYTES / (size_of::<f32>() * dim.max(1))).clamp(64, 4096);
         // Few references: smaller blocks, so that every thread gets some.
-        let shared = n_rows.div_ceil(4 * n_threads).max(32);
-        let rows_per_block = fitting.clamp(1, 4096).min(shared);
+        let shared = n_rows.div_ceil(4 * n_threads).next_multiple_of(64);
+        let rows_per_block = wanted.unwrap_or(fitting.min(shared)).max(1);
         let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
         Self { n_rows, rows_per_block, next, stopped, failures: Mutex::new(Vec::new()) }
     }
@@ -229,5 +234,5 @@ const RUN: usize = 64;
 /// Whether a score is finite and above the cutoff.
 #[inline]
 fn dropped(score: f32, cutoff: f32) -> bool {
-    (score > cutoff) & (score < f32::INFINITY)
+    score > cutoff && score < f32::INFINITY
 }

@@ -80,8 +80,8 @@ fn sum(query: &[f32], reference: &[f32], term: impl Fn(f64, f64) -> f64) -> f64 
     for (lane, (&q, &x)) in lanes.iter_mut().zip(q_rest.iter().zip(x_rest)) {
         *lane += term(f64::from(q), f64::from(x));
     }
-    let [a, b, c, d, e, f, g, h] = lanes;
-    ((a + e) + (b + f)) + ((c + g) + (d + h))
+    let [even, odd] = [0, 1].map(|i| (lanes[i] + lanes[i + 4]) + (lanes[i + 2] + lanes[i + 6]));
+    even + odd
 }
 
 #[cfg(test)]

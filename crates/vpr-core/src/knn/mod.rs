@@ -6,6 +6,7 @@ mod exact;
 mod margin;
 mod metric;
 mod rows;
+mod selected;
 mod shortlist;
 mod single;
 
@@ -13,3 +14,4 @@ pub use encoding::{Int8Row, decode_f16, decode_int8, encode_f16, encode_int8};
 pub use exact::{SearchParams, search};
 pub use metric::Metric;
 pub use rows::{RowSource, row};
+pub use selected::{PositionIndex, Selected, search_among};

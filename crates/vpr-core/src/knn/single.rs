@@ -1,5 +1,7 @@
 //! Scores of one query against the rows of a block, at the speed at which memory delivers them.
 
+#![expect(clippy::inline_always, reason = "only inlined code is compiled for the dispatched SIMD")]
+
 use pulp::{Arch, Simd, WithSimd};
 
 /// Which sum is formed over the values of the query and of a row.
