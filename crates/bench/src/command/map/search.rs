@@ -1,11 +1,11 @@
 //! `bench map search`: the nearest references of every query.
 
-use std::{fmt::Write as _, path::PathBuf};
+use std::{fmt::Write as _, path::PathBuf, str::FromStr};
 
 use vpr_core::{
-    Error, Retrieval,
+    Error, Position, Retrieval,
     cli::{self, Outcome},
-    knn::{self, Metric, SearchParams},
+    knn::{self, Metric, PositionIndex, SearchParams},
     map::{
         Access, Names, OpenMap, Opening,
         door::{self, Format, PairList, Pairs},
@@ -31,6 +31,9 @@ pub(super) struct SearchArgs {
     /// The distance; without it that of the map, and Euclidean if the map names none
     #[arg(long, value_parser = parse_metric)]
     metric: Option<Metric>,
+    /// Search only references at most RADIUS metres from X,Y (and height zero, or Z)
+    #[arg(long, value_name = "X,Y[,Z],RADIUS", allow_hyphen_values = true)]
+    near: Option<Near>,
     /// Do not check digests and finiteness of the blocks that are read
     #[arg(long)]
     trust: bool,
@@ -45,6 +48,27 @@ pub(super) struct SearchArgs {
     to: Format,
 }
 
+/// Where the query is known to be: GPS, odometry.
+#[derive(Clone, Copy)]
+struct Near {
+    center: Position,
+    radius: f64,
+}
+
+impl FromStr for Near {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split(',').map(|field| field.trim().parse::<f64>());
+        let numbers = numbers.collect::<Result<Vec<f64>, _>>().map_err(|err| err.to_string())?;
+        match numbers[..] {
+            [x, y, radius] => Ok(Self { center: Position::new(x, y, 0.0), radius }),
+            [x, y, z, radius] => Ok(Self { center: Position::new(x, y, z), radius }),
+            _ => Err("expected x,y,radius or x,y,z,radius in metres".to_owned()),
+        }
+    }
+}
+
 pub(super) fn run(args: &SearchArgs) -> anyhow::Result<Outcome> {
     let access = if args.mapped { Access::Mapped } else { Access::Read };
     let map = OpenMap::open(&args.map, Opening { access, trust: args.trust })?;
@@ -53,7 +77,15 @@ pub(super) fn run(args: &SearchArgs) -> anyhow::Result<Outcome> {
     let descriptors = queries.descriptors.ok_or_else(none)?;
     let metric = args.metric.or(map.about().metric).unwrap_or_default();
     let params = SearchParams { metric, k: args.k, ..SearchParams::default() };
-    let retrieval = knn::search(&map, &descriptors, &params)?;
+    let retrieval = match &args.near {
+        None => knn::search(&map, &descriptors, &params)?,
+        Some(near) => {
+            let no_poses = || Error::Empty("poses").in_file(&args.map);
+            let index = PositionIndex::new(&map.poses()?.ok_or_else(no_poses)?)?;
+            let rows = index.within(near.center, near.radius)?;
+            knn::search_among(&map, rows, &descriptors, &params)?
+        }
+    };
     let pairs = pairs_of(&retrieval, queries.names.as_ref(), map.names()?.as_ref());
     if let Some(out) = &args.out {
         door::write_pairs(args.to, out, &pairs)?;
