@@ -23,6 +23,8 @@ enum Command {
     Evaluate(Box<command::evaluate::EvaluateArgs>),
     /// List what there is
     List(command::list::ListArgs),
+    /// Make, convert, check and search reference maps on disk
+    Map(command::map::MapArgs),
     /// Say everything that is wrong with a dataset folder
     Validate(command::validate::ValidateArgs),
 }
@@ -32,6 +34,7 @@ fn main() -> ExitCode {
         Command::Run(args) => command::run::run(&args),
         Command::Evaluate(args) => command::evaluate::run(&args),
         Command::List(args) => command::list::run(&args),
+        Command::Map(args) => command::map::run(&args),
         Command::Validate(args) => command::validate::run(&args),
     })
 }

@@ -2,6 +2,7 @@
 
 pub(crate) mod evaluate;
 pub(crate) mod list;
+pub(crate) mod map;
 pub(crate) mod predictions;
 pub(crate) mod run;
 pub(crate) mod validate;
