@@ -1,1 +1,5 @@
-//! placeholder
+//! Images and hand-crafted vision for visual place recognition.
+
+pub mod cohog;
+pub mod hog;
+pub mod image;

@@ -1,0 +1,321 @@
+//! The one in-memory image of this workspace: 8-bit, row-major, colours in the order **red, green, blue**.
+//!
+//! [`RgbImage`] and [`GrayImage`] are kornia's own type, so everything in kornia-imgproc works on them. Decoding,
+//! the gray value and resizing are the ones OpenCV's `imread`, `cvtColor` and `resize` define, because the
+//! descriptors of the field were published through them.
+
+use std::{fs, io::Cursor, path::Path};
+
+use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
+pub use kornia_image::ImageSize;
+use kornia_image::{Image, InterpolationMode};
+use kornia_imgproc::resize::resize_opencv_u8;
+use vpr_core::{Error, Result};
+
+/// A colour image: height × width × 3 bytes, red first.
+pub type RgbImage = Image<u8, 3>;
+
+/// A gray image: height × width bytes.
+pub type GrayImage = Image<u8, 1>;
+
+/// No image with more pixels than this is decoded: 64 Mi, three times the largest phone photograph of a place.
+pub const MAX_PIXELS: usize = 1 << 26;
+
+/// No file of `n` bytes is believed to hold more than `n` times this many pixels.
+///
+/// Deflate expands at most 1032-fold and a byte of a 1-bit PNG is 8 pixels; a baseline or progressive JPEG spends
+/// at least a bit on a block of 64 pixels. A header that claims more is damaged or hostile.
+pub const MAX_PIXELS_PER_BYTE: usize = 8 * 1032;
+
+/// Reads a JPEG or PNG file, told apart by content and turned upright by its EXIF orientation.
+///
+/// Alpha is dropped, 16-bit samples are rounded to 8, gray is repeated in all three channels.
+///
+/// # Errors
+///
+/// [`Error::Io`] if the file cannot be read, and those of [`decode_bytes`].
+pub fn decode(path: &Path) -> Result<RgbImage> {
+    decode_bytes(&read(path)?, path)
+}
+
+/// [`decode`] for a file that is already in memory; `path` only names it in errors.
+///
+/// # Errors
+///
+/// [`Error::Format`] if it is neither JPEG nor PNG, if the header claims more than [`MAX_PIXELS`] or
+/// [`MAX_PIXELS_PER_BYTE`], or if the pixels are damaged or end early. A JPEG without its end marker counts as
+/// half-written and is refused, although its first rows could be shown.
+pub fn decode_bytes(bytes: &[u8], path: &Path) -> Result<RgbImage> {
+    let mut decoder = decoder(bytes, path)?;
+    let damaged = |reason: image::ImageError| Error::format(path, "pixels", reason.to_string());
+    if is_jpeg(bytes) && !is_complete_jpeg(bytes) {
+        return Err(Error::format(path, "pixels", "the file ends before the image does"));
+    }
+    let orientation = decoder.orientation().map_err(damaged)?;
+    let mut image = DynamicImage::from_decoder(decoder).map_err(damaged)?;
+    image.apply_orientation(orientation);
+    let image = image.into_rgb8();
+    let size = ImageSize { width: image.width() as usize, height: image.height() as usize };
+    Ok(from_pixels(size, image.into_raw()))
+}
+
+/// Size of an image file as [`decode`] would return it, from its header alone.
+///
+/// # Errors
+///
+/// As [`decode`], except for damage behind the header.
+pub fn probe(path: &Path) -> Result<ImageSize> {
+    let bytes = read(path)?;
+    let mut decoder = decoder(&bytes, path)?;
+    let (width, height) = decoder.dimensions();
+    let orientation = decoder
+        .orientation()
+        .map_err(|reason| Error::format(path, "header", reason.to_string()))?;
+    let (width, height) =
+        if turns_sideways(orientation) { (height, width) } else { (width, height) };
+    Ok(ImageSize { width: width as usize, height: height as usize })
+}
+
+/// Luma by ITU-R BT.601 in OpenCV's 15-bit fixed point: `(9798 R + 19235 G + 3735 B + 16384) >> 15`.
+#[must_use]
+pub fn gray(image: &RgbImage) -> GrayImage {
+    let (pixels, _) = image.as_slice().as_chunks();
+    from_pixels(image.size(), pixels.iter().copied().map(luma).collect())
+}
+
+/// Bilinear resize without anti-aliasing, byte for byte OpenCV's `resize` with `INTER_LINEAR`.
+///
+/// # Errors
+///
+/// [`Error::Parameter`] if either image has no pixels.
+pub fn resize_bilinear<const C: usize>(
+    image: &Image<u8, C>,
+    size: ImageSize,
+) -> Result<Image<u8, C>> {
+    let refuse = |size: ImageSize| Error::Parameter {
+        name: "size",
+        value: format!("{}x{}", size.width, size.height),
+        reason: "an image needs at least one pixel and at most 2^26",
+    };
+    for size in [image.size(), size] {
+        let pixels = size.width.checked_mul(size.height).ok_or_else(|| refuse(size))?;
+        if !(1..=MAX_PIXELS).contains(&pixels) {
+            return Err(refuse(size));
+        }
+    }
+    let mut resized = Image::from_size_val(size, 0).map_err(|_| refuse(size))?;
+    resize_opencv_u8(image, &mut resized, InterpolationMode::Bilinear).map_err(|_| refuse(size))?;
+    Ok(resized)
+}
+
+fn from_pixels<const C: usize>(size: ImageSize, pixels: Vec<u8>) -> Image<u8, C> {
+    Image::new(size, pixels).expect("height × width × channels bytes")
+}
+
+fn luma(pixel: [u8; 3]) -> u8 {
+    let [r, g, b] = pixel.map(u32::from);
+    u8::try_from((9798 * r + 19_235 * g + 3735 * b + 16_384) >> 15).expect("the weights sum to one")
+}
+
+fn read(path: &Path) -> Result<Vec<u8>> {
+    fs::read(path).map_err(Error::io(path))
+}
+
+/// A decoder whose header is read and believed.
+fn decoder<'a>(bytes: &'a [u8], path: &Path) -> Result<impl ImageDecoder + use<'a>> {
+    let refuse = |reason: String| Error::format(path, "header", reason);
+    let mut reader =
+        ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(Error::io(path))?;
+    if reader.format().is_none() {
+        return Err(refuse("neither JPEG nor PNG".to_owned()));
+    }
+    let believable = bytes.len().saturating_mul(MAX_PIXELS_PER_BYTE).min(MAX_PIXELS);
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(8 * believable as u64); // at most four 16-bit samples a pixel
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(|reason| refuse(reason.to_string()))?;
+    let (width, height) = decoder.dimensions();
+    let pixels = u64::from(width) * u64::from(height);
+    if pixels == 0 || pixels > believable as u64 {
+        return Err(refuse(format!(
+            "{width}x{height} pixels, but a file of {} bytes may hold from 1 to {believable}",
+            bytes.len()
+        )));
+    }
+    Ok(decoder)
+}
+
+fn is_jpeg(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0xFF, 0xD8])
+}
+
+/// Whether an end marker follows the last start of a scan; neither occurs inside of coded pixels.
+fn is_complete_jpeg(bytes: &[u8]) -> bool {
+    let marker = |code: u8| move |pair: &[u8]| pair == [0xFF, code];
+    let last_scan = bytes.windows(2).rposition(marker(0xDA)).unwrap_or(0);
+    bytes[last_scan..].windows(2).any(marker(0xD9))
+}
+
+fn turns_sideways(orientation: image::metadata::Orientation) -> bool {
+    use image::metadata::Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
+    matches!(orientation, Rotate90 | Rotate90FlipH | Rotate270 | Rotate270FlipH)
+}
+
+#[cfg(test)]
+mod tests {
+    use image::ImageFormat;
+
+    use super::*;
+
+    /// Pseudo-random bytes, the same ones that OpenCV was given.
+    fn noise(width: usize, height: usize) -> RgbImage {
+        let byte = |at: usize| u8::try_from((at * 2_654_435_761 >> 7) % 256).unwrap();
+        from_pixels(ImageSize { width, height }, (0..width * height * 3).map(byte).collect())
+    }
+
+    /// A smooth image, encoded.
+    fn encoded(format: ImageFormat) -> Vec<u8> {
+        let image = image::RgbImage::from_fn(48, 32, |x, y| {
+            image::Rgb([x * 5, y * 7, (x * y) % 256].map(|it| u8::try_from(it).unwrap()))
+        });
+        let mut file = Cursor::new(Vec::new());
+        image.write_to(&mut file, format).unwrap();
+        file.into_inner()
+    }
+
+    fn decode_here(bytes: &[u8]) -> Result<RgbImage> {
+        decode_bytes(bytes, Path::new("street.jpg"))
+    }
+
+    /// FNV-1a, so that OpenCV's answer fits in a line.
+    fn digest(bytes: &[u8]) -> u64 {
+        bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        })
+    }
+
+    #[test]
+    fn png_is_decoded_exactly_red_first() {
+        let image = decode_here(&encoded(ImageFormat::Png)).unwrap();
+        assert_eq!(image.size(), ImageSize { width: 48, height: 32 });
+        assert_eq!(&image.as_slice()[(3 * 48 + 2) * 3..][..3], [10, 21, 6]);
+    }
+
+    #[test]
+    fn jpeg_is_decoded_closely() {
+        let [png, jpeg] = [ImageFormat::Png, ImageFormat::Jpeg].map(encoded);
+        let [exact, close] = [png, jpeg].map(|it| decode_here(&it).unwrap());
+        let off = exact.as_slice().iter().zip(close.as_slice()).map(|(a, b)| a.abs_diff(*b).into());
+        let mean = off.sum::<f64>() / exact.as_slice().len() as f64;
+        assert!(mean < 6.0, "{mean}");
+    }
+
+    #[test]
+    fn truncated_files_are_refused_at_every_length() {
+        for format in [ImageFormat::Jpeg, ImageFormat::Png] {
+            let bytes = encoded(format);
+            // of a PNG, only the checksum of the empty last chunk may be missing
+            for length in 0..bytes.len() - 12 {
+                let error = decode_here(&bytes[..length]).err();
+                let error =
+                    error.unwrap_or_else(|| panic!("{format:?} of {length} bytes")).to_string();
+                assert!(error.starts_with("street.jpg: "), "{error}");
+            }
+        }
+    }
+
+    #[test]
+    fn flipped_bits_never_panic() {
+        for format in [ImageFormat::Jpeg, ImageFormat::Png] {
+            let bytes = encoded(format);
+            for bit in 0..8 * bytes.len() {
+                let mut damaged = bytes.clone();
+                damaged[bit / 8] ^= 1 << (bit % 8);
+                match decode_here(&damaged) {
+                    Ok(image) => assert!(image.width() * image.height() <= MAX_PIXELS),
+                    Err(error) => assert!(error.to_string().starts_with("street.jpg: "), "{error}"),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn headers_that_claim_too_much_are_refused() {
+        let mut bytes = encoded(ImageFormat::Jpeg);
+        let frame = bytes.windows(2).position(|it| it == [0xFF, 0xC0]).unwrap();
+        bytes[frame + 5..frame + 9].fill(0xFF); // 65535 × 65535
+        let error = decode_here(&bytes).err().unwrap().to_string();
+        assert!(error.starts_with("street.jpg: header: 65535x65535 pixels"), "{error}");
+    }
+
+    #[test]
+    fn other_files_are_refused() {
+        for bytes in [&b""[..], b"GIF89a", b"\x89PNG", b"\xFF\xD8\xFF\xD9"] {
+            assert!(decode_here(bytes).is_err());
+        }
+        let missing = decode(Path::new("no/such.jpg")).err().unwrap();
+        assert!(matches!(missing, Error::Io { .. }), "{missing}");
+    }
+
+    #[test]
+    fn probe_agrees_with_decode() -> std::io::Result<()> {
+        let folder = tempfile::tempdir()?;
+        for format in [ImageFormat::Jpeg, ImageFormat::Png] {
+            let path = folder.path().join("image");
+            fs::write(&path, encoded(format))?;
+            assert_eq!(probe(&path).unwrap(), decode(&path).unwrap().size());
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn orientation_of_the_camera_is_applied() -> std::io::Result<()> {
+        // an EXIF segment with one entry, orientation 6: turn clockwise by a quarter
+        let exif = b"\xFF\xE1\x00\x22Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0";
+        let upright = encoded(ImageFormat::Jpeg);
+        let turned = [&upright[..2], exif, &upright[2..]].concat();
+        let [upright, turned_image] = [&upright, &turned].map(|it| decode_here(it).unwrap());
+        let size = ImageSize { width: 32, height: 48 };
+        assert_eq!(turned_image.size(), size);
+        assert_eq!(turned_image.as_slice()[31 * 3..][..3], upright.as_slice()[..3]);
+        let file = tempfile::NamedTempFile::new()?;
+        fs::write(file.path(), turned)?;
+        assert_eq!(probe(file.path()).unwrap(), size);
+        Ok(())
+    }
+
+    /// Digests of `cv2.resize(noise, size)`, OpenCV 4.14.0.
+    #[test]
+    fn resize_is_that_of_opencv() {
+        let image = noise(53, 37);
+        for (width, height, expected) in [
+            (64, 64, 0xb1a9_c0ca_bea3_49bc),
+            (512, 512, 0x94d8_cf6f_4d55_3832),
+            (20, 11, 0xf6e0_f17e_5be1_a02d),
+            (53, 37, 0x7535_8260_65f3_dec6),
+            (106, 74, 0xd1a6_fce7_ed96_92d1),
+            (27, 19, 0x6503_923a_2d0b_1ddf),
+            (1, 1, 0xa094_b718_dcf2_9db8),
+            (240, 9, 0x34eb_9184_e858_85a4),
+        ] {
+            let resized = resize_bilinear(&image, ImageSize { width, height }).unwrap();
+            assert_eq!(digest(resized.as_slice()), expected, "{width} x {height}");
+        }
+        let half = resize_bilinear(&noise(60, 40), ImageSize { width: 30, height: 20 }).unwrap();
+        assert_eq!(digest(half.as_slice()), 0x07be_82d3_368f_6140);
+    }
+
+    /// Digest of `cv2.cvtColor(noise, cv2.COLOR_RGB2GRAY)`, OpenCV 4.14.0.
+    #[test]
+    fn gray_is_that_of_opencv() {
+        assert_eq!(digest(gray(&noise(53, 37)).as_slice()), 0xbb52_8b66_683d_90f1);
+    }
+
+    #[test]
+    fn images_without_pixels_are_not_resized() {
+        let (empty, full) = (ImageSize { width: 0, height: 4 }, ImageSize { width: 4, height: 4 });
+        assert!(resize_bilinear(&noise(4, 4), empty).is_err());
+        assert!(resize_bilinear(&noise(0, 4), full).is_err());
+        assert!(resize_bilinear(&noise(4, 4), ImageSize { width: usize::MAX, height: 2 }).is_err());
+    }
+}
