@@ -21,16 +21,24 @@
 //! unless named so; a lower distance is nearer, a higher similarity or confidence is more certain;
 //! ties break by lower index; every result is the same for any number of threads.
 
+#[cfg(feature = "cli")]
+pub mod cli;
+pub mod dataset;
 mod definition;
 mod descriptors;
 mod error;
+pub mod experiment;
+pub mod figure;
 mod ground_truth;
 mod map;
 pub mod metrics;
+pub mod npy;
+pub mod pickle;
 mod pose;
 mod ranking;
 mod retrieval;
 mod scores;
+pub mod table;
 
 pub use definition::Definition;
 pub use descriptors::Descriptors;

@@ -1,1 +1,3 @@
-//! placeholder
+//! Images and hand-crafted vision for visual place recognition.
+
+pub mod image;

@@ -1,0 +1,154 @@
+//! Times and sizes of techniques: table 3.6.
+
+use serde::Deserialize;
+use vpr_core::{
+    Definition, Result,
+    figure::Figure,
+    table::{Cell, Provenance, Table},
+};
+use vpr_vision::{cohog::CoHogParams, hog::HogParams};
+
+use super::{Context, subject::hand_crafted};
+use crate::technique::Technique;
+
+/// The descriptor of a technique that does not run here, as the thesis states it.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DescriptorShape {
+    /// The technique.
+    pub technique: Technique,
+    /// Vectors per image.
+    pub vectors: usize,
+    /// Dimension of a vector.
+    pub dim: usize,
+    /// Bits of one number.
+    pub bits: usize,
+}
+
+/// Images timed per technique.
+const TIMED: usize = 40;
+
+pub(super) fn run(
+    table: &mut Table,
+    timed_on: &str,
+    stored: &[String],
+    descriptors: &[DescriptorShape],
+    context: Context<'_>,
+) -> Result<Option<Figure>> {
+    times(table, timed_on, context)?;
+    stored_times(table, stored, context)?;
+    sizes(table, descriptors);
+    Ok(None)
+}
+
+/// Times measured here, each apart from the other; only on request, since they vary.
+fn times(table: &mut Table, timed_on: &str, context: Context<'_>) -> Result<()> {
+    for (column, technique) in hand_crafted() {
+        let images = context.data.images(timed_on)?.filter(|_| context.timings);
+        let Some(images) = images else {
+            for row in [ENCODING, MATCHING] {
+                table.push(Cell::absent(row, column, "measured on request: --timings"));
+            }
+            continue;
+        };
+        let paths = &images.queries[..images.queries.len().min(TIMED)];
+        let timing = technique.time(paths)?;
+        let provenance = context.data.provenance(timed_on)?;
+        let note = format!("median on one thread of this machine, {} images", images.name);
+        for (row, value) in [(ENCODING, timing.encoding), (MATCHING, timing.matching * 1e3)] {
+            let cell = Cell::new(row, column, value, provenance, paths.len());
+            table.push(cell.noted(&note).timing());
+        }
+    }
+    for technique in Technique::ALL {
+        if !matches!(technique, Technique::Hog | Technique::CoHog) {
+            for row in [ENCODING, MATCHING] {
+                table.push(Cell::absent(row, technique.name(), "its network does not run here yet"));
+            }
+        }
+    }
+    Ok(())
+}
+
+const ENCODING: &str = "t_e (s)";
+const MATCHING: &str = "t_m, default (ms)";
+
+/// Times that the authors stored with their matches.
+fn stored_times(table: &mut Table, datasets: &[String], context: Context<'_>) -> Result<()> {
+    for id in datasets {
+        let name = &context.data.entry(id)?.name;
+        for technique in Technique::ALL {
+            let rows = [format!("{ENCODING}, stored with {name}"), format!("t_m (ms), stored with {name}")];
+            let Some(stored) = context.data.stored(id, technique)? else {
+                for row in rows {
+                    let why = context.data.why_absent(id, "stored matches")?;
+                    table.push(Cell::absent(row, technique.name(), why));
+                }
+                continue;
+            };
+            let values = [stored.timing.encoding, stored.timing.matching * 1e3];
+            let n = stored.similarities.n_queries();
+            for (row, value) in rows.into_iter().zip(values) {
+                let cell = Cell::new(row, technique.name(), value, Provenance::Published, n);
+                table.push(cell.noted("as the authors measured it; matching includes printing (VB-14)"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Sizes follow from the dimensions.
+fn sizes(table: &mut Table, descriptors: &[DescriptorShape]) {
+    for shape in descriptors {
+        let note = "dimensions as the thesis states them";
+        let column = shape.technique.name();
+        size(table, column, *shape, None, Provenance::Published, note);
+    }
+    let hog = |params: HogParams| DescriptorShape {
+        technique: Technique::Hog,
+        vectors: 1,
+        dim: params.dim(),
+        bits: 32,
+    };
+    let released = "of our descriptor in the released configuration (VB-11)";
+    let thesis = "of our descriptor in the thesis' configuration";
+    size(table, "HOG", hog(HogParams::RELEASED), Some(Definition::Published), Provenance::Measured, released);
+    size(table, "HOG", hog(HogParams::THESIS), Some(Definition::Corrected), Provenance::Measured, thesis);
+    let params = CoHogParams::default();
+    let cohog = DescriptorShape {
+        technique: Technique::CoHog,
+        vectors: params.n_regions(),
+        dim: params.depth(),
+        bits: 32,
+    };
+    size(table, "CoHOG", cohog, None, Provenance::Measured, "of our descriptor");
+}
+
+fn size(
+    table: &mut Table,
+    column: &str,
+    shape: DescriptorShape,
+    definition: Option<Definition>,
+    provenance: Provenance,
+    note: &str,
+) {
+    let DescriptorShape { technique, vectors, dim, bits } = shape;
+    let kilobytes = (vectors * dim * bits / 8) as f64 / 1000.0;
+    // CoHOG's dimensions are printed the other way round, depth first.
+    let dimensions = match technique {
+        Technique::CoHog => format!("{dim}×{vectors}"),
+        _ => format!("{vectors}×{dim}"),
+    };
+    let cells = [
+        Cell::new("Desc. Size (KBs)", column, kilobytes, provenance, 1),
+        Cell::new("Desc. Dimensions", column, dimensions.as_str(), provenance, 1),
+        Cell::new("Data Type", column, format!("float-{bits}").as_str(), provenance, 1),
+    ];
+    for cell in cells {
+        let cell = cell.noted(note);
+        table.push(match definition {
+            Some(definition) => cell.defined(definition),
+            None => cell,
+        });
+    }
+}

@@ -1,0 +1,124 @@
+//! AUC-PR, size and matching time over descriptor size: table 3.9.
+
+use vpr_core::{
+    Definition, Result,
+    dataset::Dataset,
+    figure::Figure,
+    table::{Cell, Provenance, Table},
+};
+use vpr_vision::{cohog::CoHogParams, hog::HogParams};
+
+use super::{
+    Context,
+    subject::{Subject, match_images, value_cell},
+};
+use crate::technique::HandCrafted;
+
+/// What is swept.
+pub(super) struct Sweep<'a> {
+    pub(super) cell_sizes: &'a [usize],
+    pub(super) pca_dimensions: &'a [usize],
+    pub(super) max_region_pairs: f64,
+}
+
+/// Images timed per technique.
+const TIMED: usize = 12;
+
+pub(super) fn run(
+    table: &mut Table,
+    datasets: &[String],
+    sweep: Sweep<'_>,
+    context: Context<'_>,
+) -> Result<Option<Figure>> {
+    for &cell in sweep.cell_sizes {
+        for (column, technique) in at_cell_size(cell) {
+            let row = format!("{cell}x{cell}");
+            let size = kilobytes(&technique);
+            let note = "follows from the dimensions";
+            let size = Cell::new(&row, format!("{column} KBs"), size, Provenance::Measured, 1);
+            table.push(size.noted(note));
+        }
+    }
+    for &dim in sweep.pca_dimensions {
+        for column in ["NetVLAD", "DenseVLAD", "AP-GeM"] {
+            let size = (dim * size_of::<f32>()) as f64 / 1000.0;
+            let size = Cell::new(format!("PCA {dim}"), format!("{column} KBs"), size, Provenance::Published, 1);
+            table.push(size.noted("follows from the dimension"));
+        }
+    }
+    for id in datasets {
+        let name = context.data.entry(id)?.name.clone();
+        for &cell in sweep.cell_sizes {
+            let row = format!("{cell}x{cell}, {name}");
+            let Some(dataset) = context.data.images(id)? else {
+                for (column, _) in at_cell_size(cell) {
+                    let why = context.data.why_absent(id, "images")?;
+                    table.push(Cell::absent(&row, format!("{column} AUC"), why));
+                }
+                continue;
+            };
+            for (column, technique) in at_cell_size(cell) {
+                if is_too_large(&technique, &dataset, sweep.max_region_pairs) {
+                    let why = "left out: more region pairs than the experiment allows";
+                    table.push(Cell::absent(&row, format!("{column} AUC"), why));
+                    continue;
+                }
+                measure(table, &row, column, &technique, &dataset, context)?;
+            }
+        }
+    }
+    Ok(None)
+}
+
+fn at_cell_size(cell: usize) -> [(&'static str, HandCrafted); 2] {
+    [
+        ("CoHOG", HandCrafted::CoHog(CoHogParams::with_cell_size(cell))),
+        ("HOG", HandCrafted::Hog(HogParams::THESIS.with_cell_size(cell))),
+    ]
+}
+
+fn kilobytes(technique: &HandCrafted) -> f64 {
+    let numbers = match technique {
+        HandCrafted::Hog(params) => params.dim(),
+        HandCrafted::CoHog(params) => params.n_regions() * params.depth(),
+    };
+    (numbers * size_of::<f32>()) as f64 / 1000.0
+}
+
+fn is_too_large(technique: &HandCrafted, dataset: &Dataset, max_region_pairs: f64) -> bool {
+    let HandCrafted::CoHog(params) = technique else { return false };
+    let pairs = dataset.queries.len() as f64 * dataset.references.len() as f64;
+    pairs * (params.n_regions() as f64).powi(2) > max_region_pairs
+}
+
+fn measure(
+    table: &mut Table,
+    row: &str,
+    column: &'static str,
+    technique: &HandCrafted,
+    dataset: &Dataset,
+    context: Context<'_>,
+) -> Result<()> {
+    let (similarities, note) = match_images(technique, column, dataset, false, context)?;
+    let subject = Subject {
+        row: row.to_owned(),
+        column,
+        provenance: context.data.provenance(&dataset.id)?,
+        best: similarities.best(),
+        similarities,
+        truth: dataset.truth.clone(),
+        note,
+    };
+    let evaluation = subject.evaluation()?;
+    for definition in [Definition::Published, Definition::Corrected] {
+        let value = evaluation.auc_pr(evaluation.positives(definition));
+        table.push(value_cell(&subject, row, &format!("{column} AUC"), definition, value)?);
+    }
+    if context.timings {
+        let paths = &dataset.queries[..dataset.queries.len().min(TIMED)];
+        let milliseconds = technique.time(paths)?.matching * 1e3;
+        let cell = Cell::new(row, format!("{column} t_m (ms)"), milliseconds, subject.provenance, paths.len());
+        table.push(cell.timing());
+    }
+    Ok(())
+}

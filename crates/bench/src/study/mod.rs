@@ -1,0 +1,213 @@
+//! What an experiment file of chapter 3 can ask for, one file per study.
+
+mod auc_pr;
+mod cost;
+mod datasets;
+mod descriptor_size;
+mod invariance;
+mod lights;
+mod metrics;
+mod platform_speed;
+mod pr_curves;
+mod range;
+mod recall_curves;
+mod spacing;
+mod subject;
+mod swap;
+mod tolerances;
+
+use serde::Deserialize;
+use vpr_core::{
+    Result,
+    experiment::Experiment,
+    figure::{Figure, Panel},
+    table::{Provenance, Table},
+};
+
+pub use platform_speed::TechniqueTiming;
+
+use crate::data::Data;
+
+/// What to compute; the key `kind` of `[study]` chooses.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Study {
+    /// Sizes of the datasets: table 3.1.
+    Datasets {
+        /// Datasets, by id.
+        datasets: Vec<String>,
+    },
+    /// Tolerances that the published ground truths really have: table 3.2.
+    Tolerances {
+        /// Datasets, by id.
+        datasets: Vec<String>,
+    },
+    /// The taxonomy of metrics: table 3.3.
+    Metrics,
+    /// The lights of Point Features: table 3.4.
+    Lights,
+    /// AUC-PR of techniques on datasets: table 3.5.
+    AucPr {
+        /// Datasets, by id.
+        datasets: Vec<String>,
+    },
+    /// Times and sizes: table 3.6.
+    Cost {
+        /// Dataset whose images are timed.
+        timed_on: String,
+        /// Datasets with stored times.
+        stored: Vec<String>,
+        /// Techniques with the shape of their descriptors.
+        descriptors: Vec<cost::DescriptorShape>,
+    },
+    /// AUC-PR, size and time over descriptor size: table 3.9.
+    DescriptorSize {
+        /// Datasets, by id.
+        datasets: Vec<String>,
+        /// Side of a cell in pixels.
+        cell_sizes: Vec<usize>,
+        /// Dimensions after PCA, for sizes only.
+        pca_dimensions: Vec<usize>,
+        /// Largest number of region pairs for `CoHOG`; larger work is left out.
+        max_region_pairs: f64,
+    },
+    /// Precision–recall curves and what is read off them: figure 3.10.
+    PrCurves {
+        /// Datasets, by id.
+        datasets: Vec<String>,
+    },
+    /// RecallRate@N: figure 3.11.
+    RecallCurves {
+        /// Datasets, by id.
+        datasets: Vec<String>,
+    },
+    /// Distances between consecutive true positives: figure 3.14.
+    Spacing {
+        /// Datasets, by id; traverses only.
+        datasets: Vec<String>,
+    },
+    /// Queries and references exchanged: figure 3.15.
+    Swap {
+        /// Datasets, by id.
+        datasets: Vec<String>,
+    },
+    /// AUC-PR over the accepted range of frames: figure 3.17.
+    Range {
+        /// Datasets, by id; traverses aligned frame by frame.
+        datasets: Vec<String>,
+        /// Tolerances in frames.
+        tolerances: Vec<usize>,
+    },
+    /// Retrieval time against platform speed: figure 3.18.
+    PlatformSpeed {
+        /// Times per technique.
+        timings: Vec<TechniqueTiming>,
+        /// Map sizes `Z`.
+        map_sizes: Vec<usize>,
+        /// `K` of eq. 3.7.
+        frames_per_metre: f64,
+        /// Fastest platform drawn, in metres per second.
+        max_speed: f64,
+        /// Dataset whose images are timed.
+        timed_on: String,
+    },
+    /// Scores under growing variation and the area between the curves: figure 3.19.
+    Invariance {
+        /// Dataset with the stored curves.
+        stored: String,
+        /// Datasets with image series.
+        series: Vec<String>,
+    },
+}
+
+/// What a study made: numbers, and a drawing of them if it is a figure.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// The numbers.
+    pub table: Table,
+    /// The drawing.
+    pub figure: Option<Figure>,
+}
+
+/// Told how far long work is.
+pub trait Observer: Sync {
+    /// Work of `n` steps begins.
+    fn start(&self, what: &str, n: usize);
+    /// One step is done.
+    fn step(&self);
+    /// The work has ended.
+    fn end(&self);
+}
+
+/// Listens to nothing.
+impl Observer for () {
+    fn start(&self, _: &str, _: usize) {}
+    fn step(&self) {}
+    fn end(&self) {}
+}
+
+/// What every study is given.
+#[derive(Clone, Copy)]
+pub struct Context<'a> {
+    /// The data at hand.
+    pub data: &'a Data,
+    /// Told about progress.
+    pub observer: &'a dyn Observer,
+    /// Whether to measure what differs from run to run.
+    pub timings: bool,
+    /// Seed of the bootstrap.
+    pub seed: u64,
+}
+
+/// The panel with this title, added if there is none yet.
+fn panel_of<'a>(figure: &'a mut Figure, title: &str, new: impl FnOnce() -> Panel) -> &'a mut Panel {
+    let index = figure.panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {
+        figure.panels.push(Panel { title: title.to_owned(), ..new() });
+        figure.panels.len() - 1
+    });
+    &mut figure.panels[index]
+}
+
+/// What tells a curve computed here from the author's in a legend.
+fn origin_mark(provenance: Provenance) -> &'static str {
+    match provenance {
+        Provenance::Published | Provenance::Absent => "",
+        Provenance::Measured => " (measured)",
+        Provenance::Generated => " (generated)",
+    }
+}
+
+/// Computes what the experiment asks for, as far as its data is at hand.
+///
+/// # Errors
+///
+/// Wrong files name themselves; missing ones make absent cells.
+pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Report> {
+    let mut table = experiment.table();
+    let figure = match &experiment.study {
+        Study::Datasets { datasets } => datasets::run(&mut table, datasets, context)?,
+        Study::Tolerances { datasets } => tolerances::run(&mut table, datasets, context)?,
+        Study::Metrics => metrics::run(&mut table),
+        Study::Lights => lights::run(&mut table),
+        Study::AucPr { datasets } => auc_pr::run(&mut table, datasets, context)?,
+        Study::Cost { timed_on, stored, descriptors } => {
+            cost::run(&mut table, timed_on, stored, descriptors, context)?
+        }
+        Study::DescriptorSize { datasets, cell_sizes, pca_dimensions, max_region_pairs } => {
+            let sweep = descriptor_size::Sweep { cell_sizes, pca_dimensions, max_region_pairs: *max_region_pairs };
+            descriptor_size::run(&mut table, datasets, sweep, context)?
+        }
+        Study::PrCurves { datasets } => pr_curves::run(&mut table, datasets, context)?,
+        Study::RecallCurves { datasets } => recall_curves::run(&mut table, datasets, context)?,
+        Study::Spacing { datasets } => spacing::run(&mut table, datasets, context)?,
+        Study::Swap { datasets } => swap::run(&mut table, datasets, context)?,
+        Study::Range { datasets, tolerances } => range::run(&mut table, datasets, tolerances, context)?,
+        Study::PlatformSpeed { timings, map_sizes, frames_per_metre, max_speed, timed_on } => {
+            let platform = platform_speed::Drive { map_sizes, frames_per_metre: *frames_per_metre, max_speed: *max_speed };
+            platform_speed::run(&mut table, timings, platform, timed_on, context)?
+        }
+        Study::Invariance { stored, series } => invariance::run(&mut table, stored, series, context)?,
+    };
+    experiment.fill_thesis(&mut table);
+    Ok(Report { table, figure })
+}

@@ -1,0 +1,94 @@
+//! Tolerances that the published ground truths really have: table 3.2.
+
+use vpr_core::{
+    Result,
+    dataset::layout::vpr_bench::GroundTruthFile,
+    figure::Figure,
+    table::{Cell, Provenance, Table},
+};
+
+use super::Context;
+
+/// Column of the tolerance as text, which is what the thesis prints.
+const COLUMN: &str = "Ground-truth Tolerance";
+
+pub(super) fn run(
+    table: &mut Table,
+    datasets: &[String],
+    context: Context<'_>,
+) -> Result<Option<Figure>> {
+    for id in datasets {
+        let row = context.data.entry(id)?.name.clone();
+        let Some(file) = context.data.ground_truth(id)? else {
+            table.push(Cell::absent(row, COLUMN, context.data.why_absent(id, "ground truth")?));
+            continue;
+        };
+        let n = file.len();
+        let provenance =
+            if id == "fixture" { Provenance::Generated } else { Provenance::Published };
+        let text = describe(&file);
+        table.push(Cell::new(&row, COLUMN, text.as_str(), provenance, n));
+        let lists = file.lists.iter().filter(|list| list.as_slice() != [-1]);
+        let counts: Vec<usize> = lists.map(Vec::len).collect();
+        let most = counts.iter().copied().max().unwrap_or(0) as f64;
+        let fewest = counts.iter().copied().min().unwrap_or(0) as f64;
+        table.push(Cell::new(&row, "fewest correct references", fewest, provenance, n));
+        table.push(Cell::new(&row, "most correct references", most, provenance, n));
+    }
+    Ok(None)
+}
+
+/// What the lists of a ground truth amount to, in the thesis' words where they fit.
+fn describe(file: &GroundTruthFile) -> String {
+    let lists: Vec<(i64, &[i64])> = (0..)
+        .zip(&file.lists)
+        .map(|(query, list)| (query, list.as_slice()))
+        .filter(|(_, list)| !list.is_empty() && *list != [-1])
+        .collect();
+    let spans = |stride: i64| -> Option<i64> {
+        let reach = |(query, list): &(i64, &[i64])| {
+            list.iter().map(|reference| (reference - query * stride).abs()).max().unwrap_or(0)
+        };
+        let tolerance = lists.iter().map(reach).max()?;
+        // Every reference in range must be listed, or the lists are not a range of frames.
+        let is_range = lists.iter().all(|(query, list)| {
+            let centre = query * stride;
+            let low = (centre - tolerance).max(0);
+            list.iter().copied().eq(low..low + list.len() as i64)
+                && (list.len() as i64 >= centre - low + 1)
+        });
+        is_range.then_some(tolerance)
+    };
+    if lists.iter().all(|(_, list)| list.len() == 1) {
+        return "Frame-to-frame".to_owned();
+    }
+    if let Some(tolerance) = spans(1) {
+        return format!("± {tolerance} frames");
+    }
+    if let Some(tolerance) = spans(10) {
+        return format!("± {tolerance} frames, reference 10 q");
+    }
+    let first = lists[0].1.len();
+    if lists.iter().all(|(_, list)| list.len() == first) {
+        return format!("{first} frames");
+    }
+    "lists, not a range of frames".to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn describe_lists(lists: Vec<Vec<i64>>) -> String {
+        describe(&GroundTruthFile { path: "test".into(), lists })
+    }
+
+    #[test]
+    fn ranges_of_frames_are_recognized() {
+        assert_eq!(describe_lists(vec![vec![0], vec![1], vec![-1]]), "Frame-to-frame");
+        assert_eq!(describe_lists(vec![vec![0, 1], vec![0, 1, 2], vec![1, 2]]), "± 1 frames");
+        assert_eq!(describe_lists(vec![vec![0, 1], vec![9, 10, 11]]), "± 1 frames, reference 10 q");
+        assert_eq!(describe_lists(vec![vec![0, 7], vec![3, 9]]), "2 frames");
+        assert_eq!(describe_lists(vec![vec![0, 7], vec![3]]), "lists, not a range of frames");
+    }
+}

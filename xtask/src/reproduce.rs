@@ -1,0 +1,134 @@
+//! From ids to experiment files to the chapters' programs.
+#![expect(clippy::print_stdout, reason = "`--list` is data")]
+
+use std::{
+    env, fs,
+    path::{Path, PathBuf},
+    process::{Command, ExitCode},
+};
+
+use anyhow::{Context, bail};
+use serde::Deserialize;
+
+#[expect(clippy::struct_excessive_bools, reason = "one per command-line flag")]
+/// What to reproduce, from which data, in which format.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// Tables and figures, such as `table-3.5`
+    #[arg(value_name = "ID", required_unless_present_any = ["all", "list"])]
+    ids: Vec<String>,
+    /// Every experiment there is
+    #[arg(long, conflicts_with = "ids")]
+    all: bool,
+    /// Say which experiments there are
+    #[arg(long)]
+    list: bool,
+    /// Folder of the datasets
+    #[arg(long, env = "VPR_DATA", value_name = "DIR", default_value = "data")]
+    data: PathBuf,
+    /// Format on stdout: table, csv, json or markdown
+    #[arg(long, value_name = "FORMAT", default_value = "table")]
+    format: String,
+    /// Write the pages in `docs/results`
+    #[arg(long)]
+    write: bool,
+    /// Compare with the pages in `docs/results` and with the expected numbers
+    #[arg(long, conflicts_with = "write")]
+    check: bool,
+    /// Measure timings as well; they differ from run to run
+    #[arg(long)]
+    timings: bool,
+}
+
+/// The two keys of an experiment file that matter here.
+#[derive(Deserialize)]
+struct Experiment {
+    title: String,
+    chapter: String,
+}
+
+/// Runs every experiment asked for, then reports the worst exit code: 0, 1 (a number is off) or
+/// 2 (could not run).
+pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let root = workspace_root()?;
+    let known = ids(&root)?;
+    if args.list {
+        for id in &known {
+            println!("{id}  {}", read(&root, id)?.title);
+        }
+        return Ok(ExitCode::SUCCESS);
+    }
+    let ids = if args.all { &known } else { &args.ids };
+    if let Some(id) = ids.iter().find(|id| !known.contains(id)) {
+        bail!("no experiment `{id}`; `cargo xtask reproduce --list` names them");
+    }
+    let mut worst = 0;
+    for id in ids {
+        let code = reproduce(&root, id, args)?;
+        worst = worst.max(code);
+    }
+    Ok(ExitCode::from(worst))
+}
+
+fn reproduce(root: &Path, id: &str, args: &Args) -> anyhow::Result<u8> {
+    let chapter = read(root, id)?.chapter;
+    let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut command = Command::new(cargo);
+    command.current_dir(root).args(["run", "--quiet", "--package", &chapter, "--bin", &chapter]);
+    command.args(["--", "run"]).arg(format!("experiments/{id}.toml"));
+    let data = env::current_dir().context("current folder")?.join(&args.data);
+    command.arg("--data").arg(data).args(["--format", &args.format]);
+    for (is_set, flag) in [(args.write, "--write"), (args.check, "--check")] {
+        if is_set {
+            command.args([flag, "docs/results"]);
+        }
+    }
+    if args.timings {
+        command.arg("--timings");
+    }
+    let status = command.status().with_context(|| format!("running `{chapter}`"))?;
+    Ok(status.code().and_then(|code| u8::try_from(code).ok()).map_or(2, |code| code.min(2)))
+}
+
+fn workspace_root() -> anyhow::Result<PathBuf> {
+    let manifest = env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from);
+    let xtask = manifest.unwrap_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")));
+    Ok(xtask.parent().context("xtask lies in the workspace")?.to_owned())
+}
+
+/// Ids of all experiment files, tables before figures, by number.
+fn ids(root: &Path) -> anyhow::Result<Vec<String>> {
+    let folder = root.join("experiments");
+    let mut ids = Vec::new();
+    for entry in fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
+        let path = entry?.path();
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            ids.extend(path.file_stem().and_then(|stem| stem.to_str()).map(str::to_owned));
+        }
+    }
+    ids.sort_by_key(|id| sort_key(id));
+    Ok(ids)
+}
+
+fn sort_key(id: &str) -> (bool, Vec<u32>, String) {
+    let numbers = id.split(['-', '.']).filter_map(|part| part.parse().ok()).collect();
+    (!id.starts_with("table"), numbers, id.to_owned())
+}
+
+fn read(root: &Path, id: &str) -> anyhow::Result<Experiment> {
+    let path = root.join("experiments").join(format!("{id}.toml"));
+    let text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+    toml::from_str(&text).with_context(|| path.display().to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_come_before_figures_and_numbers_count_as_numbers() {
+        let mut ids = ["figure-3.10", "table-3.10", "figure-3.9", "table-3.9"].map(String::from);
+        ids.sort_by_key(|id| sort_key(id));
+        assert_eq!(ids, ["table-3.9", "table-3.10", "figure-3.9", "figure-3.10"]);
+    }
+}
