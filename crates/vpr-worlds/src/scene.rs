@@ -98,7 +98,7 @@ impl Scene {
             })
             .collect();
         let mut time = std::time::Duration::ZERO;
-        let hierarchy = build_cwbvh(&bounds, BvhBuildParams::slow_build(), &mut time);
+        let hierarchy = build_cwbvh(&bounds, BvhBuildParams::medium_build(), &mut time);
         let grid = LampGrid::new(&lamps);
         let n_narrow = shapes.len() as u32;
         shapes.extend(wide);
