@@ -8,7 +8,7 @@ use vpr_core::Error;
 use crate::{
     camera::Camera,
     condition::Condition,
-    family::{Archive, Campus, Interior, Rail, Stage, Street},
+    family::{Campus, Interior, Rail, SevenScenes, Stage, Street},
     film::Film,
 };
 
@@ -63,12 +63,12 @@ pub struct Recipe {
     /// Corridors and rooms.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interior: Option<Interior>,
-    /// Old prints of streets.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub archive: Option<Archive>,
     /// A few places under measured viewpoints and lights.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stage: Option<Stage>,
+    /// Rooms of a few square metres and a hand-held camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seven_scenes: Option<SevenScenes>,
 }
 
 /// The folders and names of a dataset.
@@ -79,7 +79,8 @@ pub enum Layout {
     VprBench,
     /// `images/test/{database,queries}/@easting@northing@….jpg`.
     Utm,
-    /// `seq-01/frame-000000.{color.png,depth.png,pose.txt}`; references in the first sequences.
+    /// `seq-01/frame-000000.{color.png,depth.png,pose.txt}`; references in the first sequence, queries
+    /// in the second, further views in the third.
     SevenScenes,
 }
 
@@ -165,6 +166,16 @@ impl Recipe {
         Ok(recipe)
     }
 
+    /// Reads a recipe file and sets some of its keys, as [`crate::recipe_with`] does.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`], and those of [`Self::parse`].
+    pub fn read_with(path: &Path, settings: &[(&str, &str)]) -> vpr_core::Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+        crate::catalog::set(&text, path, settings)
+    }
+
     fn check(&self) -> Result<(), Refusal> {
         count("places", self.places, 1, 20_000)?;
         count("new_places", self.new_places, 0, 20_000)?;
@@ -186,13 +197,13 @@ impl Recipe {
             self.rail.as_ref().map(Rail::check),
             self.campus.as_ref().map(Campus::check),
             self.interior.as_ref().map(Interior::check),
-            self.archive.as_ref().map(Archive::check),
             self.stage.as_ref().map(Stage::check),
+            self.seven_scenes.as_ref().map(SevenScenes::check),
         ];
         let n_families = families.iter().flatten().count();
         if n_families != 1 {
             let reason = format!("{n_families} families are given, not one");
-            return Err(Refusal { key: "street, rail, campus, interior, archive, stage", reason });
+            return Err(Refusal { key: "street, rail, campus, interior, stage, seven_scenes", reason });
         }
         families.into_iter().flatten().collect()
     }

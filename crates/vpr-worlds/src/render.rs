@@ -8,7 +8,7 @@ use crate::{
     light::Light,
     material::{Colour, Paint, Touch},
     noise::{cloudy, step},
-    scene::{Scene, Shape},
+    scene::{Lamp, Scene, Shape},
 };
 
 /// What a camera looks at.
@@ -17,6 +17,8 @@ pub(crate) struct View<'a> {
     /// Things that only this image has, right in front of the camera.
     pub(crate) foreground: &'a [Shape],
     pub(crate) light: &'a Light,
+    /// A lamp that only this image has.
+    pub(crate) lamp: Option<Lamp>,
     pub(crate) camera: &'a Camera,
     pub(crate) pose: &'a vpr_core::Pose,
 }
@@ -194,8 +196,8 @@ fn ambient(light: &Light, normal: Vec3, height: f32) -> Colour {
 
 fn lamplight(view: &View<'_>, start: Vec3, normal: Vec3) -> Colour {
     let mut sum = Vec3::ZERO;
-    for &number in view.scene.lamps_near(start) {
-        let lamp = &view.scene.lamps[number as usize];
+    let near = view.scene.lamps_near(start).iter().map(|&number| &view.scene.lamps[number as usize]);
+    for lamp in near.chain(&view.lamp) {
         let on = if lamp.by_day { 1.0 } else { view.light.lamps };
         let offset = lamp.position - start;
         let d2 = offset.length_squared();

@@ -1,18 +1,18 @@
 //! The families of worlds: each turns its table of a recipe into scenes and shots.
 
-mod archive;
 mod campus;
 mod interior;
 mod rail;
+mod seven_scenes;
 mod stage;
 mod street;
 
-pub use archive::Archive;
 pub use campus::Campus;
-pub use interior::Interior;
+pub use interior::{Interior, Kind};
 pub use rail::Rail;
-pub use stage::Stage;
-pub use street::Street;
+pub use seven_scenes::SevenScenes;
+pub use stage::{LIGHTS_DEG, Stage, StageKind};
+pub use street::{Grid, Street};
 
 use glam::Vec3;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -23,7 +23,7 @@ use crate::{
     film::Film,
     light::Light,
     recipe::{Offset, Recipe, Tolerance, Traverse},
-    scene::{Scene, Shape},
+    scene::{Lamp, Scene, Shape},
     seed::Seed,
 };
 
@@ -33,7 +33,10 @@ pub(crate) struct Plan {
     pub(crate) lights: Vec<Light>,
     pub(crate) references: Vec<Shot>,
     pub(crate) queries: Vec<Shot>,
-    pub(crate) truth: GroundTruth,
+    /// Further views, for maps that are denser than the references.
+    pub(crate) grid: Vec<Shot>,
+    /// From the frame in which scenes are built (z up) to the one in which poses are told.
+    pub(crate) world_from_scene: vpr_core::Pose,
 }
 
 /// One image to take.
@@ -49,28 +52,31 @@ pub(crate) struct Shot {
     /// Snow in the air.
     pub(crate) falling: f64,
     pub(crate) foreground: Vec<Shape>,
+    /// A lamp that is on for this image only.
+    pub(crate) lamp: Option<Lamp>,
     pub(crate) seed: Seed,
     /// The place it belongs to; `None` for a new place.
     pub(crate) place: Option<usize>,
 }
 
 /// Builds the scenes and lists the shots of a recipe.
-pub(crate) fn plan(recipe: &Recipe) -> Plan {
+///
+/// # Errors
+///
+/// Those of reading the files that the recipe names.
+pub(crate) fn plan(recipe: &Recipe) -> vpr_core::Result<Plan> {
     let seed = Seed::new(recipe.seed);
-    if let Some(street) = &recipe.street {
-        street.plan(recipe, seed)
-    } else if let Some(rail) = &recipe.rail {
-        rail.plan(recipe, seed)
-    } else if let Some(campus) = &recipe.campus {
-        campus.plan(recipe, seed)
-    } else if let Some(interior) = &recipe.interior {
-        interior.plan(recipe, seed)
-    } else if let Some(archive) = &recipe.archive {
-        archive.plan(recipe, seed)
-    } else {
-        let stage = recipe.stage.as_ref().expect("a checked recipe has one family");
-        stage.plan(recipe, seed)
+    if let Some(scenes) = &recipe.seven_scenes {
+        return scenes.plan(recipe, seed);
     }
+    let plans = [
+        recipe.street.map(|family| family.plan(recipe, seed)),
+        recipe.rail.map(|family| family.plan(recipe, seed)),
+        recipe.campus.map(|family| family.plan(recipe, seed)),
+        recipe.interior.map(|family| family.plan(recipe, seed)),
+        recipe.stage.map(|family| family.plan(recipe, seed)),
+    ];
+    Ok(plans.into_iter().flatten().next().expect("a checked recipe has one family"))
 }
 
 /// A camera at `eye` that looks along `heading` (radians counter-clockwise from +x), level.
@@ -159,6 +165,7 @@ pub(crate) fn drive(
                 film: traverse.film,
                 falling: traverse.condition.falling,
                 foreground: Vec::new(),
+                lamp: None,
                 seed: own,
                 place: usize::try_from(place).ok(),
             }

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{Plan, level_pose, truth, two_traverses};
+use super::{Plan, level_pose, two_traverses};
 use crate::{
     geometry::Geometry,
     light::Light,
@@ -77,8 +77,7 @@ impl Rail {
             Light::new(&recipe.queries.condition, seed.named("second light")),
         ];
         let (references, queries) = two_traverses(recipe, &route, seed, |_, _| Vec::new());
-        let truth = truth(recipe.tolerance, &queries, &references);
-        Plan { scenes, lights, references, queries, truth }
+        Plan { scenes, lights, references, queries, grid: Vec::new(), world_from_scene: vpr_core::Pose::identity() }
     }
 }
 

@@ -3,13 +3,13 @@
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{Plan, level_pose, truth, two_traverses};
+use super::{Plan, Shot, drive, level_pose, two_traverses};
 use crate::{
     geometry::Geometry,
     light::Light,
     material::{Material, Roads, rgb},
     parts::{Grove, Lot, Species, StreetKit, Style, hide_behind, house},
-    recipe::{Recipe, Refusal, Traverse, between, count},
+    recipe::{Offset, Recipe, Refusal, Traverse, between, count},
     scene::{Draft, Scene},
     seed::Seed,
 };
@@ -34,6 +34,21 @@ pub struct Street {
     pub eye_m: f64,
     /// Camera direction, degrees counter-clockwise from the direction of travel.
     pub heading_deg: f64,
+    /// Further views on a grid around the references' route.
+    pub grid: Option<Grid>,
+}
+
+/// True images at the places of a densified map: `rows` beside each other across the route and
+/// `columns` along it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// Number of places across the route.
+    pub rows: usize,
+    /// Number of places along the route.
+    pub columns: usize,
+    /// Distance between them, metres.
+    pub step_m: f64,
 }
 
 impl Default for Street {
@@ -47,6 +62,7 @@ impl Default for Street {
             trees: 0.45,
             eye_m: 1.9,
             heading_deg: 25.0,
+            grid: None,
         }
     }
 }
@@ -69,6 +85,11 @@ impl Street {
         between("street.aliasing", self.aliasing, 0.0, 1.0)?;
         between("street.trees", self.trees, 0.0, 1.0)?;
         between("street.eye_m", self.eye_m, 0.3, 6.0)?;
+        if let Some(grid) = self.grid {
+            count("street.grid.rows", grid.rows, 1, 200)?;
+            count("street.grid.columns", grid.columns, 1, 200)?;
+            between("street.grid.step_m", grid.step_m, 0.01, 50.0)?;
+        }
         between("street.heading_deg", self.heading_deg, -180.0, 180.0)
     }
 
@@ -85,8 +106,23 @@ impl Street {
             Light::new(&recipe.references.condition, seed.named("first light")),
             Light::new(&recipe.queries.condition, seed.named("second light")),
         ];
-        let truth = truth(recipe.tolerance, &queries, &references);
-        Plan { scenes: vec![first, second], lights, references, queries, truth }
+        let grid = self.views(recipe, seed);
+        Plan { scenes: vec![first, second], lights, references, queries, grid, world_from_scene: vpr_core::Pose::identity() }
+    }
+
+    /// Views of the first traverse on the grid, looking as the references do.
+    fn views(&self, recipe: &Recipe, seed: Seed) -> Vec<Shot> {
+        let Some(Grid { rows, columns, step_m }) = self.grid else { return Vec::new() };
+        let heading = (90.0 + self.heading_deg).to_radians();
+        let route: Vec<_> = (0..rows * columns)
+            .map(|k| {
+                let x = 1.7 + step_m * ((k / columns) as f64 - 0.5 * (rows - 1) as f64);
+                let y = 3.0 + step_m * (k % columns) as f64;
+                level_pose(Vec3::new(x as f32, y as f32, self.eye_m as f32), heading)
+            })
+            .collect();
+        let level = Traverse { offset: Offset::default(), ..recipe.references };
+        drive(recipe, &level, &route, 0, seed.named("grid"))
     }
 
     /// Level poses in the middle of the right lane.
