@@ -24,9 +24,9 @@ static MEMORY: PeakAlloc = PeakAlloc;
 /// Inputs per format: a quarter are cut off, a quarter have one bit flipped, half are wilder.
 const ROUNDS: usize = 4000;
 /// Memory a parser may use whatever the file: buffers, tables of decoders.
-const FIXED_BYTES: usize = 2 << 20;
+const FIXED_BYTES: usize = 256 << 10;
 /// Memory per byte of the file: a line of two letters becomes names, poses and errors.
-const BYTES_PER_BYTE: usize = 600;
+const BYTES_PER_BYTE: usize = 32;
 
 fn corpus() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fuzz/corpus")
