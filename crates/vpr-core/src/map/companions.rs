@@ -50,12 +50,13 @@ impl MapFile {
         Ok(Some(poses))
     }
 
-    /// Checks the digests of positions and orientations.
-    pub(super) fn check_pose_digests(&self) -> Result<()> {
-        [layout::POSITIONS, layout::ORIENTATIONS]
-            .into_iter()
-            .filter(|name| self.header().tensors.contains_key(*name))
-            .try_for_each(|name| self.read_tensor(name).map(drop))
+    /// Checks the digest of a tensor, if there is one of this name.
+    pub(super) fn check_tensor_digest(&self, name: &str) -> Result<()> {
+        if self.header().tensors.contains_key(name) {
+            self.read_tensor(name).map(drop)
+        } else {
+            Ok(())
+        }
     }
 
     /// The lengths of the stored quaternions; none without orientations.
