@@ -2,7 +2,10 @@
 
 use vpr_core::{
     BestMatches, Definition, GroundTruth, Ranking, Result, Similarities,
-    metrics::{self, bootstrap::{Interval, Resampling, bootstrap, pick}},
+    metrics::{
+        self,
+        bootstrap::{Interval, Resampling, bootstrap, pick},
+    },
 };
 
 pub use vpr_core::metrics::Positives;

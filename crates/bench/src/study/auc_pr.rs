@@ -1,10 +1,6 @@
 //! AUC-PR of techniques on datasets: table 3.5.
 
-use vpr_core::{
-    Definition, Error, Result,
-    figure::Figure,
-    table::Table,
-};
+use vpr_core::{Definition, Error, Result, figure::Figure, table::Table};
 
 use super::{
     Context,

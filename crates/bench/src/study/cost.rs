@@ -63,7 +63,11 @@ fn times(table: &mut Table, timed_on: &str, context: Context<'_>) -> Result<()> 
     for technique in Technique::ALL {
         if !matches!(technique, Technique::Hog | Technique::CoHog) {
             for row in [ENCODING, MATCHING] {
-                table.push(Cell::absent(row, technique.name(), "its network does not run here yet"));
+                table.push(Cell::absent(
+                    row,
+                    technique.name(),
+                    "its network does not run here yet",
+                ));
             }
         }
     }
@@ -78,7 +82,10 @@ fn stored_times(table: &mut Table, datasets: &[String], context: Context<'_>) ->
     for id in datasets {
         let name = &context.data.entry(id)?.name;
         for technique in Technique::ALL {
-            let rows = [format!("{ENCODING}, stored with {name}"), format!("t_m (ms), stored with {name}")];
+            let rows = [
+                format!("{ENCODING}, stored with {name}"),
+                format!("t_m (ms), stored with {name}"),
+            ];
             let Some(stored) = context.data.stored(id, technique)? else {
                 for row in rows {
                     let why = context.data.why_absent(id, "stored matches")?;
@@ -90,7 +97,9 @@ fn stored_times(table: &mut Table, datasets: &[String], context: Context<'_>) ->
             let n = stored.similarities.n_queries();
             for (row, value) in rows.into_iter().zip(values) {
                 let cell = Cell::new(row, technique.name(), value, Provenance::Published, n);
-                table.push(cell.noted("as the authors measured it; matching includes printing (VB-14)"));
+                table.push(
+                    cell.noted("as the authors measured it; matching includes printing (VB-14)"),
+                );
             }
         }
     }
@@ -112,8 +121,22 @@ fn sizes(table: &mut Table, descriptors: &[DescriptorShape]) {
     };
     let released = "of our descriptor in the released configuration (VB-11)";
     let thesis = "of our descriptor in the thesis' configuration";
-    size(table, "HOG", hog(HogParams::RELEASED), Some(Definition::Published), Provenance::Measured, released);
-    size(table, "HOG", hog(HogParams::THESIS), Some(Definition::Corrected), Provenance::Measured, thesis);
+    size(
+        table,
+        "HOG",
+        hog(HogParams::RELEASED),
+        Some(Definition::Published),
+        Provenance::Measured,
+        released,
+    );
+    size(
+        table,
+        "HOG",
+        hog(HogParams::THESIS),
+        Some(Definition::Corrected),
+        Provenance::Measured,
+        thesis,
+    );
     let params = CoHogParams::default();
     let cohog = DescriptorShape {
         technique: Technique::CoHog,

@@ -23,7 +23,9 @@ pub(super) fn run(
         let provenance = context.data.provenance(id)?;
         let why = context.data.why_absent(id, "images")?;
         if let Some(images) = &images {
-            for (column, paths) in [("Queries", &images.queries), ("References", &images.references)] {
+            for (column, paths) in
+                [("Queries", &images.queries), ("References", &images.references)]
+            {
                 table.push(Cell::new(&row, column, paths.len() as f64, provenance, paths.len()));
             }
             table.push(resolution(&row, "Query Res.", &images.queries, provenance)?);
@@ -55,12 +57,7 @@ pub(super) fn run(
 }
 
 /// The resolution of all images, or of most of them with a remark.
-fn resolution(
-    row: &str,
-    column: &str,
-    images: &[PathBuf],
-    provenance: Provenance,
-) -> Result<Cell> {
+fn resolution(row: &str, column: &str, images: &[PathBuf], provenance: Provenance) -> Result<Cell> {
     let mut counts: Vec<((usize, usize), usize)> = Vec::new();
     for path in images {
         let size = image::probe(path)?;

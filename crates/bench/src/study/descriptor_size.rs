@@ -42,7 +42,13 @@ pub(super) fn run(
     for &dim in sweep.pca_dimensions {
         for column in ["NetVLAD", "DenseVLAD", "AP-GeM"] {
             let size = (dim * size_of::<f32>()) as f64 / 1000.0;
-            let size = Cell::new(format!("PCA {dim}"), format!("{column} KBs"), size, Provenance::Published, 1);
+            let size = Cell::new(
+                format!("PCA {dim}"),
+                format!("{column} KBs"),
+                size,
+                Provenance::Published,
+                1,
+            );
             table.push(size.noted("follows from the dimension"));
         }
     }
@@ -117,7 +123,13 @@ fn measure(
     if context.timings {
         let paths = &dataset.queries[..dataset.queries.len().min(TIMED)];
         let milliseconds = technique.time(paths)?.matching * 1e3;
-        let cell = Cell::new(row, format!("{column} t_m (ms)"), milliseconds, subject.provenance, paths.len());
+        let cell = Cell::new(
+            row,
+            format!("{column} t_m (ms)"),
+            milliseconds,
+            subject.provenance,
+            paths.len(),
+        );
         table.push(cell.timing());
     }
     Ok(())

@@ -46,7 +46,14 @@ pub(super) fn run(
         if let (Some(same), Some(other)) = files {
             let (same, other) = (read_curves(&same)?, read_curves(&other)?);
             for (technique, curves) in paired(&same, &other) {
-                report(table, &mut figure, technique.name(), variation, &curves, Provenance::Published)?;
+                report(
+                    table,
+                    &mut figure,
+                    technique.name(),
+                    variation,
+                    &curves,
+                    Provenance::Published,
+                )?;
             }
         } else {
             for technique in &Technique::ALL[..8] {
@@ -129,7 +136,8 @@ fn report(
     let highest_other = curves.other.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let n_below = curves.same.iter().filter(|&&score| score <= highest_other).count();
     let share = n_below as f64 / n as f64;
-    let cell = Cell::new(row, format!("{variation}: share another place can beat"), share, provenance, n);
+    let cell =
+        Cell::new(row, format!("{variation}: share another place can beat"), share, provenance, n);
     table.push(cell.defined(Definition::Corrected));
     let points = |scores: &[f64]| (1..).zip(scores).map(|(x, &y)| (f64::from(x), y)).collect();
     figure.panels.push(Panel {

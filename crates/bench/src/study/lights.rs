@@ -33,13 +33,13 @@ pub const LIGHTS: [(f64, f64); 19] = [
 ];
 
 pub(super) fn run(table: &mut Table) -> Option<Figure> {
-    let note = "stated by the thesis, which swaps the names: its θ is the azimuth, its φ the elevation";
+    let note =
+        "stated by the thesis, which swaps the names: its θ is the azimuth, its φ the elevation";
     for (led, (azimuth, elevation)) in (1..).zip(LIGHTS) {
         let row = format!("LED {led}");
-        for (definition, columns) in [
-            (Definition::Published, ["θ", "φ"]),
-            (Definition::Corrected, ["azimuth", "elevation"]),
-        ] {
+        for (definition, columns) in
+            [(Definition::Published, ["θ", "φ"]), (Definition::Corrected, ["azimuth", "elevation"])]
+        {
             for (column, value) in columns.into_iter().zip([azimuth, elevation]) {
                 let cell = Cell::new(&row, column, value, Provenance::Published, 1);
                 table.push(cell.defined(definition).noted(note));

@@ -194,19 +194,31 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
             cost::run(&mut table, timed_on, stored, descriptors, context)?
         }
         Study::DescriptorSize { datasets, cell_sizes, pca_dimensions, max_region_pairs } => {
-            let sweep = descriptor_size::Sweep { cell_sizes, pca_dimensions, max_region_pairs: *max_region_pairs };
+            let sweep = descriptor_size::Sweep {
+                cell_sizes,
+                pca_dimensions,
+                max_region_pairs: *max_region_pairs,
+            };
             descriptor_size::run(&mut table, datasets, sweep, context)?
         }
         Study::PrCurves { datasets } => pr_curves::run(&mut table, datasets, context)?,
         Study::RecallCurves { datasets } => recall_curves::run(&mut table, datasets, context)?,
         Study::Spacing { datasets } => spacing::run(&mut table, datasets, context)?,
         Study::Swap { datasets } => swap::run(&mut table, datasets, context)?,
-        Study::Range { datasets, tolerances } => range::run(&mut table, datasets, tolerances, context)?,
+        Study::Range { datasets, tolerances } => {
+            range::run(&mut table, datasets, tolerances, context)?
+        }
         Study::PlatformSpeed { timings, map_sizes, frames_per_metre, max_speed, timed_on } => {
-            let platform = platform_speed::Drive { map_sizes, frames_per_metre: *frames_per_metre, max_speed: *max_speed };
+            let platform = platform_speed::Drive {
+                map_sizes,
+                frames_per_metre: *frames_per_metre,
+                max_speed: *max_speed,
+            };
             platform_speed::run(&mut table, timings, platform, timed_on, context)?
         }
-        Study::Invariance { stored, series } => invariance::run(&mut table, stored, series, context)?,
+        Study::Invariance { stored, series } => {
+            invariance::run(&mut table, stored, series, context)?
+        }
     };
     experiment.fill_thesis(&mut table);
     Ok(Report { table, figure })

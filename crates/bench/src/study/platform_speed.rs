@@ -54,7 +54,11 @@ pub(super) fn run(
         let images = context.data.images(timed_on)?.filter(|_| context.timings);
         let Some(images) = images else {
             for &size in drive.map_sizes {
-                table.push(Cell::absent(&row, limit_column(size), "measured on request: --timings"));
+                table.push(Cell::absent(
+                    &row,
+                    limit_column(size),
+                    "measured on request: --timings",
+                ));
             }
             continue;
         };

@@ -29,7 +29,9 @@ pub(super) fn run(
             Ok(points) => {
                 sample(table, &subject, &points);
                 let name = format!("{}{}", subject.column, super::origin_mark(subject.provenance));
-                super::panel_of(&mut figure, &subject.row, panel).curves.push(Curve { name, points });
+                super::panel_of(&mut figure, &subject.row, panel)
+                    .curves
+                    .push(Curve { name, points });
             }
             Err(Error::Undefined { .. }) => {}
             Err(err) => return Err(err),
@@ -77,7 +79,9 @@ fn summarize(table: &mut Table, subject: &Subject, evaluation: &Evaluation<'_>) 
     push_both(table, subject, &row, "R@95%P", |it| {
         metrics::recall_at_precision(0.95, confidence, correct, positives(it))
     })?;
-    push_both(table, subject, &row, "F1 max", |it| metrics::f1_max(confidence, correct, positives(it)))
+    push_both(table, subject, &row, "F1 max", |it| {
+        metrics::f1_max(confidence, correct, positives(it))
+    })
 }
 
 /// Precision where recall first reaches each of [`RECALLS`].

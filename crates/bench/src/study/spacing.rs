@@ -27,7 +27,8 @@ pub(super) fn run(
             let counts = metrics::true_positive_spacing(definition, evaluation.correct())?;
             list(table, &subject, definition, &counts);
             if definition == Definition::Corrected {
-                let points = counts.iter().enumerate().skip(1).map(|(gap, &n)| (gap as f64, n as f64));
+                let points =
+                    counts.iter().enumerate().skip(1).map(|(gap, &n)| (gap as f64, n as f64));
                 let name = format!("{}{}", subject.column, super::origin_mark(subject.provenance));
                 let curve = Curve { name, points: points.collect() };
                 super::panel_of(&mut figure, &subject.row, panel).curves.push(curve);

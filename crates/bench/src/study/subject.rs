@@ -87,7 +87,9 @@ pub(super) fn stored(id: &str, context: Context<'_>) -> Result<Vec<Subject>> {
         let Some(stored) = context.data.stored(id, technique)? else { continue };
         let note = match stored.n_clamped {
             0 => None,
-            n => Some(format!("{n} entries of the ground truth point past the references and are dropped")),
+            n => Some(format!(
+                "{n} entries of the ground truth point past the references and are dropped"
+            )),
         };
         subjects.push(Subject {
             row: context.data.entry(id)?.name.clone(),
@@ -143,7 +145,10 @@ pub(super) fn match_images(
     context.observer.end();
     let matched = queries.match_with(&references)?;
     let note = (matched.n_fallbacks > 0).then(|| {
-        format!("in {} queries no region passes the entropy threshold: all are used (VB-12)", matched.n_fallbacks)
+        format!(
+            "in {} queries no region passes the entropy threshold: all are used (VB-12)",
+            matched.n_fallbacks
+        )
     });
     Ok((matched.similarities, note))
 }

@@ -48,7 +48,8 @@ fn swapped(table: &mut Table, datasets: &[String], context: Context<'_>) -> Resu
                 similarities,
                 truth: subject.truth.swapped(),
                 note: (!is_symmetric).then(|| {
-                    "the stored scores weight regions of the query; exchanged they still do".to_owned()
+                    "the stored scores weight regions of the query; exchanged they still do"
+                        .to_owned()
                 }),
                 ..subject
             });
