@@ -69,7 +69,10 @@ mod tests {
             let camera = Camera { distortion, ..Camera::default() };
             for (x, y) in [(0.5, 0.5), (160.0, 120.0), (300.25, 17.5), (319.5, 239.5)] {
                 let back = camera.project(&(camera.direction(x, y) * 7.0)).unwrap();
-                assert!((back.0 - x).abs() < 1e-3 && (back.1 - y).abs() < 1e-3, "{distortion}: {back:?}");
+                assert!(
+                    (back.0 - x).abs() < 1e-3 && (back.1 - y).abs() < 1e-3,
+                    "{distortion}: {back:?}"
+                );
             }
         }
     }

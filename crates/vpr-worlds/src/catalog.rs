@@ -125,7 +125,10 @@ mod tests {
             ("queries.conditions.snow", "1"),
         ] {
             let err = recipe_with("street", &[(key, value)]).unwrap_err().to_string();
-            let last = key.rsplit('.').find(|part| !["snow"].contains(part) || key.contains("condition.")).unwrap();
+            let last = key
+                .rsplit('.')
+                .find(|part| !["snow"].contains(part) || key.contains("condition."))
+                .unwrap();
             assert!(err.contains(last), "{key} = {value}: {err}");
         }
         let err = recipe_with("street", &[("rail.woods", "0.5")]).unwrap_err().to_string();
@@ -136,7 +139,8 @@ mod tests {
     #[test]
     fn a_set_key_is_the_only_one_that_changes() {
         let plain = recipe("street").unwrap();
-        let mut dark = recipe_with("world/street", &[("queries.condition.darkness", "0.7")]).unwrap();
+        let mut dark =
+            recipe_with("world/street", &[("queries.condition.darkness", "0.7")]).unwrap();
         assert!((dark.queries.condition.darkness - 0.7).abs() < 1e-12);
         dark.queries.condition.darkness = plain.queries.condition.darkness;
         assert_eq!(plain, dark);

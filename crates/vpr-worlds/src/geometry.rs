@@ -103,9 +103,8 @@ impl Geometry {
             }
             Self::Ellipsoid { center, radii, holes, grain, seed } => {
                 let (near, far) = hit_ellipsoid(ray, center, radii)?;
-                let solid = |t: f32| {
-                    holes <= 0.0 || value3(seed, (ray.at(t) - center) / grain) > holes
-                };
+                let solid =
+                    |t: f32| holes <= 0.0 || value3(seed, (ray.at(t) - center) / grain) > holes;
                 [near, far].into_iter().find(|&t| t > NEAR && t < limit && solid(t))
             }
             Self::Pillar { base, height, bottom, top } => {
@@ -267,9 +266,17 @@ fn spot_on_block(point: Vec3, center: Vec3, half: Vec3, turn: Vec2) -> Spot {
     let local = turned_back(point - center, turn);
     let away = (local / half).abs();
     let (face, normal, u, v) = if away.z >= away.x && away.z >= away.y {
-        if local.z > 0.0 { (4, Vec3::Z, Vec3::X, Vec3::Y) } else { (5, -Vec3::Z, Vec3::X, -Vec3::Y) }
+        if local.z > 0.0 {
+            (4, Vec3::Z, Vec3::X, Vec3::Y)
+        } else {
+            (5, -Vec3::Z, Vec3::X, -Vec3::Y)
+        }
     } else if away.x >= away.y {
-        if local.x > 0.0 { (0, Vec3::X, Vec3::Y, Vec3::Z) } else { (1, -Vec3::X, -Vec3::Y, Vec3::Z) }
+        if local.x > 0.0 {
+            (0, Vec3::X, Vec3::Y, Vec3::Z)
+        } else {
+            (1, -Vec3::X, -Vec3::Y, Vec3::Z)
+        }
     } else if local.y > 0.0 {
         (2, Vec3::Y, -Vec3::X, Vec3::Z)
     } else {

@@ -56,7 +56,9 @@ use std::path::Path;
 pub use camera::Camera;
 pub use catalog::{names, recipe, recipe_with};
 pub use condition::Condition;
-pub use family::{Campus, Grid, Interior, Kind, LIGHTS_DEG, Rail, SevenScenes, Stage, StageKind, Street};
+pub use family::{
+    Campus, Grid, Interior, Kind, LIGHTS_DEG, Rail, SevenScenes, Stage, StageKind, Street,
+};
 pub use film::Film;
 pub use layout::Side;
 pub use preview::preview;

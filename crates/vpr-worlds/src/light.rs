@@ -53,13 +53,16 @@ impl Light {
         let warm = Vec3::new(1.0, 0.95, 0.88).lerp(Vec3::new(1.0, 0.62, 0.35), low);
         let clear = 1.0 - cloud;
         let blue = Vec3::new(0.26, 0.45, 0.85).lerp(Vec3::splat(0.72), 0.9 * cloud);
-        let pale = Vec3::new(0.78, 0.86, 0.95).lerp(Vec3::splat(0.8), cloud).lerp(warm, 0.4 * low * clear);
+        let pale =
+            Vec3::new(0.78, 0.86, 0.95).lerp(Vec3::splat(0.8), cloud).lerp(warm, 0.4 * low * clear);
         let town = Vec3::new(0.006, 0.005, 0.004) * step(0.3, 0.8, darkness);
         let horizon = pale * 0.95 * day + town * 2.0;
         Self {
             sun,
             sunlight: warm * (2.4 * clear * day),
-            ambient: (blue.lerp(pale, 0.5) * lerp(0.55, 1.0, cloud) + Vec3::splat(0.12 * snow)) * day + town,
+            ambient: (blue.lerp(pale, 0.5) * lerp(0.55, 1.0, cloud) + Vec3::splat(0.12 * snow))
+                * day
+                + town,
             headlight: narrow(condition.headlights) * step(0.3, 0.7, darkness),
             lamps: step(0.3, 0.7, darkness),
             haze: 3.9 / narrow(condition.visibility_m),
@@ -100,7 +103,9 @@ impl Light {
             let cover = cloudy(self.seed, plane * 1.3, 5, 0.02);
             let threshold = lerp(0.72, 0.25, self.cloud);
             let share = step(threshold, threshold + 0.2, cover) * step(0.0, 0.15, direction.z);
-            let white = Vec3::splat(lerp(1.25, 0.62, self.cloud * cover)) * day.max(self.zenith.z * 0.8) * 1.1;
+            let white = Vec3::splat(lerp(1.25, 0.62, self.cloud * cover))
+                * day.max(self.zenith.z * 0.8)
+                * 1.1;
             colour = colour.lerp(white, share * 0.85);
             let at = direction * 180.0;
             let star = cell(self.seed, (at.x + at.z) as i32, (at.y - at.z) as i32);

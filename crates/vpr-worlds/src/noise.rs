@@ -32,11 +32,12 @@ pub(crate) fn cloudy(seed: u32, at: Vec2, octaves: u32, footprint: f32) -> f32 {
     let (mut sum, mut weight, mut frequency, mut total) = (0.0, 0.5, 1.0_f32, 0.0);
     for octave in 0..octaves {
         total += weight;
-        sum += weight * if frequency * footprint < 0.7 {
-            value(seed.wrapping_add(octave), at * frequency)
-        } else {
-            0.5
-        };
+        sum += weight
+            * if frequency * footprint < 0.7 {
+                value(seed.wrapping_add(octave), at * frequency)
+            } else {
+                0.5
+            };
         weight *= 0.5;
         frequency *= 2.03;
     }

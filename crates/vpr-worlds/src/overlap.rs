@@ -53,11 +53,13 @@ impl Survey {
         let columns = (other.camera.width as usize).div_ceil(DEPTH_STEP);
         let seen = self.points.iter().filter(|point| {
             let at = back * Point3::new(f64::from(point.x), f64::from(point.y), f64::from(point.z));
-            other.camera.project(&at.coords).filter(|&pixel| other.camera.sees(pixel)).is_some_and(|(x, y)| {
-                let cell = (y as usize / DEPTH_STEP) * columns + x as usize / DEPTH_STEP;
-                let nearest = f64::from(other.depth[cell]);
-                at.z <= nearest * 1.05 + 0.05
-            })
+            other.camera.project(&at.coords).filter(|&pixel| other.camera.sees(pixel)).is_some_and(
+                |(x, y)| {
+                    let cell = (y as usize / DEPTH_STEP) * columns + x as usize / DEPTH_STEP;
+                    let nearest = f64::from(other.depth[cell]);
+                    at.z <= nearest * 1.05 + 0.05
+                },
+            )
         });
         seen.count() as f32 / self.points.len() as f32
     }
@@ -69,5 +71,50 @@ pub(crate) fn matrix(queries: &[Survey], references: &[Survey]) -> Array2<f32> {
         .par_iter()
         .map(|query| references.iter().map(|reference| query.seen_by(reference)).collect())
         .collect();
-    Array2::from_shape_fn((queries.len(), references.len()), |(query, reference)| rows[query][reference])
+    Array2::from_shape_fn((queries.len(), references.len()), |(query, reference)| {
+        rows[query][reference]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Isometry3;
+
+    use super::*;
+
+    /// A camera that looks along +z of the world at a wall at z = 10.
+    fn before_the_wall(x: f64, z: f64) -> Survey {
+        let camera = Camera::default();
+        let n = (camera.width * camera.height) as usize;
+        let exposure = Exposure {
+            colours: vec![Vec3::ZERO; n],
+            depth: vec![10.0 - z as f32; n],
+            moving: vec![false; n],
+        };
+        Survey::new(&camera, &Isometry3::translation(x, 0.0, z), &exposure)
+    }
+
+    #[test]
+    fn side_by_side_before_a_wall_the_overlap_is_symmetric() {
+        let (left, right) = (before_the_wall(0.0, 0.0), before_the_wall(3.0, 0.0));
+        // The view is 320 / 230 · 10 m = 13.9 m wide, so 78 % of it is shared.
+        assert!((left.seen_by(&right) - 0.78).abs() < 0.03, "{}", left.seen_by(&right));
+        assert!((left.seen_by(&right) - right.seen_by(&left)).abs() < 0.01);
+        assert_eq!(left.seen_by(&left), 1.0);
+    }
+
+    #[test]
+    fn a_nearer_camera_sees_less_of_what_a_farther_one_sees() {
+        let (far, near) = (before_the_wall(0.0, 0.0), before_the_wall(0.0, 5.0));
+        assert_eq!(near.seen_by(&far), 1.0);
+        assert!((far.seen_by(&near) - 0.25).abs() < 0.03, "{}", far.seen_by(&near));
+    }
+
+    #[test]
+    fn what_is_hidden_or_moving_does_not_count() {
+        let far = before_the_wall(0.0, 0.0);
+        let mut blocked = before_the_wall(0.0, 0.0);
+        blocked.depth.fill(2.0);
+        assert_eq!(far.seen_by(&blocked), 0.0);
+    }
 }

@@ -23,7 +23,8 @@ pub fn preview(recipe: &Recipe, n: usize, columns: usize) -> vpr_core::Result<Rg
     let plan = plan(recipe)?;
     let n = n.clamp(1, plan.queries.len());
     let nearest = |query: &Shot| {
-        let distance = |shot: &Shot| (shot.pose.translation.vector - query.pose.translation.vector).norm();
+        let distance =
+            |shot: &Shot| (shot.pose.translation.vector - query.pose.translation.vector).norm();
         plan.references.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
     };
     let picks: Vec<&Shot> = (0..n)

@@ -141,7 +141,12 @@ pub(crate) fn between(key: &'static str, value: f64, low: f64, high: f64) -> Res
     Err(Refusal { key, reason: format!("{value} is not within {low} to {high}") })
 }
 
-pub(crate) fn count(key: &'static str, value: usize, low: usize, high: usize) -> Result<(), Refusal> {
+pub(crate) fn count(
+    key: &'static str,
+    value: usize,
+    low: usize,
+    high: usize,
+) -> Result<(), Refusal> {
     if (low..=high).contains(&value) {
         return Ok(());
     }
@@ -158,7 +163,9 @@ impl Recipe {
         let recipe: Self = toml::from_str(text).map_err(|error| {
             let place = error.span().map_or_else(
                 || "recipe".to_owned(),
-                |span| format!("line {}", text[..span.start.min(text.len())].lines().count().max(1)),
+                |span| {
+                    format!("line {}", text[..span.start.min(text.len())].lines().count().max(1))
+                },
             );
             Error::format(path, place, error.message())
         })?;
@@ -203,7 +210,10 @@ impl Recipe {
         let n_families = families.iter().flatten().count();
         if n_families != 1 {
             let reason = format!("{n_families} families are given, not one");
-            return Err(Refusal { key: "street, rail, campus, interior, stage, seven_scenes", reason });
+            return Err(Refusal {
+                key: "street, rail, campus, interior, stage, seven_scenes",
+                reason,
+            });
         }
         families.into_iter().flatten().collect()
     }

@@ -125,7 +125,13 @@ fn trace(view: &View<'_>, ray: &Ray) -> Sample {
             None => {
                 let colour = view.light.sky(ray.direction);
                 let normal = -ray.direction;
-                return Sample { colour, distance: f32::INFINITY, shape: u32::MAX, normal, moving: false };
+                return Sample {
+                    colour,
+                    distance: f32::INFINITY,
+                    shape: u32::MAX,
+                    normal,
+                    moving: false,
+                };
             }
         },
     };
@@ -171,7 +177,8 @@ fn shade(view: &View<'_>, ray: &Ray, touch: &Touch, mut paint: Paint) -> Colour 
     arriving += lamplight(view, start, normal);
     if light.headlight > 0.0 {
         let d2 = (ray.origin - touch.point).length_squared().max(1.0);
-        arriving += Vec3::new(1.0, 0.95, 0.85) * (light.headlight * normal.dot(-ray.direction).max(0.0) / d2);
+        arriving += Vec3::new(1.0, 0.95, 0.85)
+            * (light.headlight * normal.dot(-ray.direction).max(0.0) / d2);
     }
     let mut colour = paint.albedo * arriving + paint.glow;
     if paint.gloss > 0.0 {
@@ -196,7 +203,8 @@ fn ambient(light: &Light, normal: Vec3, height: f32) -> Colour {
 
 fn lamplight(view: &View<'_>, start: Vec3, normal: Vec3) -> Colour {
     let mut sum = Vec3::ZERO;
-    let near = view.scene.lamps_near(start).iter().map(|&number| &view.scene.lamps[number as usize]);
+    let near =
+        view.scene.lamps_near(start).iter().map(|&number| &view.scene.lamps[number as usize]);
     for lamp in near.chain(&view.lamp) {
         let on = if lamp.by_day { 1.0 } else { view.light.lamps };
         let offset = lamp.position - start;
@@ -219,7 +227,8 @@ fn lamplight(view: &View<'_>, start: Vec3, normal: Vec3) -> Colour {
 fn cover_with_snow(paint: &mut Paint, touch: &Touch, normal: Vec3, snow: f32) {
     let at = Vec2::new(touch.point.x, touch.point.y);
     let patchy = cloudy(touch.seed ^ 0x51, at * 0.8, 4, 0.8 * touch.footprint);
-    let lies = step(0.25, 0.6, normal.z) * step(1.0 - snow - 0.15, 1.0 - snow + 0.1, patchy * 0.7 + 0.3 * snow);
+    let lies = step(0.25, 0.6, normal.z)
+        * step(1.0 - snow - 0.15, 1.0 - snow + 0.1, patchy * 0.7 + 0.3 * snow);
     paint.albedo = paint.albedo.lerp(Vec3::new(0.86, 0.88, 0.92), lies);
     paint.gloss *= 1.0 - lies;
 }

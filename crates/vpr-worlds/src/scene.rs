@@ -219,15 +219,36 @@ mod tests {
         let mut draft = Draft::default();
         for k in 0..300 {
             let own = seed.at(k);
-            let center = Vec3::new(own.at(0).range(-9.0, 9.0), own.at(1).range(-9.0, 9.0), own.at(2).range(-3.0, 3.0));
-            let size = Vec3::new(own.at(3).range(0.2, 1.5), own.at(4).range(0.2, 1.5), own.at(5).range(0.2, 1.5));
+            let center = Vec3::new(
+                own.at(0).range(-9.0, 9.0),
+                own.at(1).range(-9.0, 9.0),
+                own.at(2).range(-3.0, 3.0),
+            );
+            let size = Vec3::new(
+                own.at(3).range(0.2, 1.5),
+                own.at(4).range(0.2, 1.5),
+                own.at(5).range(0.2, 1.5),
+            );
             draft.add(
                 match k % 5 {
                     0 => Geometry::block(center, size, own.at(6).unit() * 6.0),
                     1 => Geometry::ball(center, size),
-                    2 => Geometry::Pillar { base: center, height: size.z, bottom: size.x, top: 0.5 * size.y },
-                    3 => Geometry::Patch { corner: center, u: size, v: Vec3::new(-size.y, size.x, 0.3) },
-                    _ => Geometry::triangle(center, center + size, center + Vec3::new(0.0, -1.0, 1.0)),
+                    2 => Geometry::Pillar {
+                        base: center,
+                        height: size.z,
+                        bottom: size.x,
+                        top: 0.5 * size.y,
+                    },
+                    3 => Geometry::Patch {
+                        corner: center,
+                        u: size,
+                        v: Vec3::new(-size.y, size.x, 0.3),
+                    },
+                    _ => Geometry::triangle(
+                        center,
+                        center + size,
+                        center + Vec3::new(0.0, -1.0, 1.0),
+                    ),
                 },
                 0,
                 0,
@@ -237,8 +258,15 @@ mod tests {
         let mut n_hits = 0;
         for k in 0..2_000 {
             let own = seed.named("ray").at(k);
-            let direction = Vec3::new(own.at(0).range(-1.0, 1.0), own.at(1).range(-1.0, 1.0), own.at(2).range(-0.4, 0.4));
-            let ray = Ray { origin: Vec3::new(0.01, 0.02, own.at(3).unit()), direction: direction.normalize() };
+            let direction = Vec3::new(
+                own.at(0).range(-1.0, 1.0),
+                own.at(1).range(-1.0, 1.0),
+                own.at(2).range(-0.4, 0.4),
+            );
+            let ray = Ray {
+                origin: Vec3::new(0.01, 0.02, own.at(3).unit()),
+                direction: direction.normalize(),
+            };
             let found = scene.nearest(&ray, 50.0).map(|hit| hit.t);
             let searched = scene.shapes.iter().filter_map(|shape| shape.geometry.hit(&ray, 50.0));
             let searched = searched.min_by(f32::total_cmp);

@@ -101,7 +101,8 @@ mod tests {
         let n = 20_000;
         let mean = (0..n).map(|key| seed.at(key).unit()).sum::<f32>() / n as f32;
         assert!((mean - 0.5).abs() < 0.01, "{mean}");
-        let variance = (0..n).map(|key| normal(seed.at(key).bits()).powi(2)).sum::<f32>() / n as f32;
+        let variance =
+            (0..n).map(|key| normal(seed.at(key).bits()).powi(2)).sum::<f32>() / n as f32;
         assert!((variance - 1.0).abs() < 0.05, "{variance}");
     }
 }

@@ -5,7 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use image::{ExtendedColorType, ImageEncoder, RgbImage, codecs::{jpeg::JpegEncoder, png::PngEncoder}};
+use image::{
+    ExtendedColorType, ImageEncoder, RgbImage,
+    codecs::{jpeg::JpegEncoder, png::PngEncoder},
+};
 use ndarray::Array2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -126,12 +129,13 @@ impl World {
             .map_err(|cause| Error::format(&path, "image", cause.to_string()))?
             .to_luma16();
         let unit = layout::depth_unit(self.recipe.layout) as f32;
-        Ok(Array2::from_shape_fn((image.height() as usize, image.width() as usize), |(row, column)| {
-            match image.get_pixel(column as u32, row as u32).0[0] {
+        Ok(Array2::from_shape_fn(
+            (image.height() as usize, image.width() as usize),
+            |(row, column)| match image.get_pixel(column as u32, row as u32).0[0] {
                 u16::MAX => f32::INFINITY,
                 value => f32::from(value) * unit,
-            }
-        }))
+            },
+        ))
     }
 
     /// Share of every query's static surface points that every reference sees,
@@ -164,7 +168,8 @@ pub(crate) fn take(plan: &Plan, shot: &Shot) -> (RgbImage, Exposure) {
 }
 
 fn folder_name(recipe: &Recipe, text: &str) -> Result<String> {
-    let files = recipe.seven_scenes.as_ref().map(SevenScenes::files).transpose()?.unwrap_or_default();
+    let files =
+        recipe.seven_scenes.as_ref().map(SevenScenes::files).transpose()?.unwrap_or_default();
     let digest = Sha256::new()
         .chain_update(RENDERER.to_le_bytes())
         .chain_update(text)
@@ -174,12 +179,16 @@ fn folder_name(recipe: &Recipe, text: &str) -> Result<String> {
     Ok(format!("{}-{short}", recipe.name))
 }
 
-fn write(recipe: &Recipe, text: &str, cache: &Path, folder: &Path, done: &(dyn Fn() + Sync)) -> Result<()> {
+fn write(
+    recipe: &Recipe,
+    text: &str,
+    cache: &Path,
+    folder: &Path,
+    done: &(dyn Fn() + Sync),
+) -> Result<()> {
     fs::create_dir_all(cache).map_err(Error::io(cache))?;
-    let partial = tempfile::Builder::new()
-        .prefix(".partial-")
-        .tempdir_in(cache)
-        .map_err(Error::io(cache))?;
+    let partial =
+        tempfile::Builder::new().prefix(".partial-").tempdir_in(cache).map_err(Error::io(cache))?;
     let root = partial.path();
     let mut plan = plan(recipe)?;
     layout::in_reading_order(recipe.layout, &mut plan);
@@ -231,7 +240,10 @@ fn write_side(
             if recipe.depth {
                 let path = layout::depth_path(recipe.layout, side, &path);
                 let bytes = encode_depth(&exposure, shot, layout::depth_unit(recipe.layout));
-                save(&root.join(&path), &bytes.map_err(|cause| Error::format(&path, "image", cause.to_string()))?)?;
+                save(
+                    &root.join(&path),
+                    &bytes.map_err(|cause| Error::format(&path, "image", cause.to_string()))?,
+                )?;
             }
             done();
             Ok(recipe.overlap.then(|| Survey::new(&shot.camera, &shot.pose, &exposure)))
@@ -255,7 +267,8 @@ fn encode(image: &RgbImage, path: &Path) -> Result<Vec<u8>> {
 
 /// Sixteen bits a pixel; 65535 is "further than that".
 fn encode_depth(exposure: &Exposure, shot: &Shot, unit: f64) -> image::ImageResult<Vec<u8>> {
-    let counts = exposure.depth.iter().map(|&depth| (f64::from(depth) / unit).round().min(65_535.0) as u16);
+    let counts =
+        exposure.depth.iter().map(|&depth| (f64::from(depth) / unit).round().min(65_535.0) as u16);
     let counts: Vec<u8> = counts.flat_map(u16::to_ne_bytes).collect();
     let mut bytes = Vec::new();
     let (width, height) = (shot.camera.width, shot.camera.height);
@@ -305,7 +318,8 @@ fn digest(root: &Path) -> Result<(usize, u64, String)> {
         .map(|path| {
             let bytes = fs::read(path).map_err(Error::io(path))?;
             let name = path.strip_prefix(root).unwrap_or(path).to_string_lossy().into_owned();
-            let digest = Sha256::new().chain_update(name).chain_update([0]).chain_update(&bytes).finalize();
+            let digest =
+                Sha256::new().chain_update(name).chain_update([0]).chain_update(&bytes).finalize();
             Ok((bytes.len() as u64, digest.into()))
         })
         .collect::<Result<_>>()?;

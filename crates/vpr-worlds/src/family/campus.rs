@@ -65,9 +65,17 @@ impl Campus {
             Light::new(&recipe.queries.condition, seed.named("second light")),
         ];
         let share = recipe.queries.condition.occlusion;
-        let (references, queries) =
-            two_traverses(recipe, &route, seed, |pose, own| hide_behind(&kit, pose, &recipe.camera, share, own));
-        Plan { scenes: vec![first, second], lights, references, queries, grid: Vec::new(), world_from_scene: vpr_core::Pose::identity() }
+        let (references, queries) = two_traverses(recipe, &route, seed, |pose, own| {
+            hide_behind(&kit, pose, &recipe.camera, share, own)
+        });
+        Plan {
+            scenes: vec![first, second],
+            lights,
+            references,
+            queries,
+            grid: Vec::new(),
+            world_from_scene: vpr_core::Pose::identity(),
+        }
     }
 }
 
@@ -89,23 +97,33 @@ impl Walk<'_> {
     fn build(&self, traverse: &Traverse, number: i64) -> (Scene, StreetKit) {
         let mut draft = Draft::default();
         let kit = StreetKit::new(&mut draft, self.seed.named("kit"));
-        let grove = Grove::new(&mut draft, self.seed.named("grove"), traverse.condition.bare as f32);
+        let grove =
+            Grove::new(&mut draft, self.seed.named("grove"), traverse.condition.bare as f32);
         let lawn = draft.material(Material::Meadow { colour: rgb(84, 120, 54) });
         let ground = Ground {
             slabs: draft.material(Material::Pavement { colour: rgb(168, 160, 148) }),
-            concrete: draft.material(Material::Wall { kind: Wall::Concrete, colour: rgb(168, 166, 160) }),
+            concrete: draft
+                .material(Material::Wall { kind: Wall::Concrete, colour: rgb(168, 166, 160) }),
             glass_roof: draft.material(Material::Plain { colour: rgb(150, 158, 160), gloss: 0.2 }),
             poster: draft.material(Material::Picture),
         };
         let far = Vec3::new(-3_000.0, -3_000.0, -0.05);
-        draft.add(Geometry::Patch { corner: far, u: Vec3::X * 6_000.0, v: Vec3::Y * 6_600.0 }, lawn, 3);
+        draft.add(
+            Geometry::Patch { corner: far, u: Vec3::X * 6_000.0, v: Vec3::Y * 6_600.0 },
+            lawn,
+            3,
+        );
         let half = 0.5 * self.campus.path_m as f32;
         let n = (self.length / STRETCH).ceil() as i64 + 6;
         for stretch in -1..n {
             let look = self.seed.named("stretch").at(stretch);
             let y = stretch as f32 * STRETCH;
             let corner = Vec3::new(-half, y, 0.0);
-            draft.add(Geometry::Patch { corner, u: Vec3::X * 2.0 * half, v: Vec3::Y * STRETCH }, ground.slabs, look.bits());
+            draft.add(
+                Geometry::Patch { corner, u: Vec3::X * 2.0 * half, v: Vec3::Y * STRETCH },
+                ground.slabs,
+                look.bits(),
+            );
             for side in [-1.0, 1.0] {
                 let own = look.at(if side < 0.0 { 1 } else { 2 });
                 if own.at(0).chance(0.62) {
@@ -128,7 +146,11 @@ impl Walk<'_> {
             for person in 0..3 {
                 let now = self.seed.named("people").at(number).at(stretch).at(person);
                 if now.at(0).chance(0.6 * traverse.condition.traffic as f32) {
-                    let at = Vec3::new(now.at(1).range(-half, half), y + now.at(2).range(0.0, STRETCH), 0.0);
+                    let at = Vec3::new(
+                        now.at(1).range(-half, half),
+                        y + now.at(2).range(0.0, STRETCH),
+                        0.0,
+                    );
                     kit.person(&mut draft, at, now.at(3));
                 }
             }
@@ -142,7 +164,13 @@ impl Walk<'_> {
         } else {
             own.named("model")
         };
-        let wall = model.at(0).pick(&[Wall::Brick, Wall::Concrete, Wall::Concrete, Wall::Plaster, Wall::Stone]);
+        let wall = model.at(0).pick(&[
+            Wall::Brick,
+            Wall::Concrete,
+            Wall::Concrete,
+            Wall::Plaster,
+            Wall::Stone,
+        ]);
         let floor = model.at(1).range(3.2, 4.0);
         let n_floors = 1 + model.at(2).index(5);
         let opening = Opening {
@@ -154,17 +182,39 @@ impl Walk<'_> {
             shutters: None,
             inset: model.at(7).range(0.1, 0.35),
         };
-        let colour = if wall == Wall::Brick { rgb(156, 92, 70) } else { hue(model.at(8).range(0.02, 0.16), model.at(9).range(0.0, 0.25), model.at(10).range(0.6, 0.9)) };
+        let colour = if wall == Wall::Brick {
+            rgb(156, 92, 70)
+        } else {
+            hue(
+                model.at(8).range(0.02, 0.16),
+                model.at(9).range(0.0, 0.25),
+                model.at(10).range(0.6, 0.9),
+            )
+        };
         let front = if model.at(11).chance(0.4) {
             let shop = own.at(12).bits();
-            Front::Shop { ground: hue(model.at(13).unit(), 0.4, 0.35), ink: rgb(240, 240, 230), shop }
+            Front::Shop {
+                ground: hue(model.at(13).unit(), 0.4, 0.35),
+                ink: rgb(240, 240, 230),
+                shop,
+            }
         } else {
             Front::Home { door: hue(model.at(14).unit(), 0.5, 0.4) }
         };
         let trim = hue(model.at(15).unit(), 0.15, 0.7);
         let facade = Facade {
-            wall, colour, trim, frame: Vec3::splat(model.at(16).range(0.02, 0.7)), floor, ground: 4.0,
-            bay: model.at(17).range(2.4, 5.0), opening, front, face: 255, bands: model.at(18).chance(0.6), quoins: false,
+            wall,
+            colour,
+            trim,
+            frame: Vec3::splat(model.at(16).range(0.02, 0.7)),
+            floor,
+            ground: 4.0,
+            bay: model.at(17).range(2.4, 5.0),
+            opening,
+            front,
+            face: 255,
+            bands: model.at(18).chance(0.6),
+            quoins: false,
         };
         let facade = draft.material(Material::Facade(Box::new(facade)));
         let away = 0.5 * self.campus.path_m as f32 + own.at(20).range(0.6, 9.0);
@@ -172,13 +222,21 @@ impl Walk<'_> {
         let high = 4.2 + floor * n_floors as f32;
         let gap = own.at(21).range(0.0, 3.0);
         let low = Vec3::new(near.min(far), y + gap, -0.1);
-        draft.add(Geometry::span(low, Vec3::new(near.max(far), y + STRETCH - 0.5, high)), facade, model.at(22).bits());
+        draft.add(
+            Geometry::span(low, Vec3::new(near.max(far), y + STRETCH - 0.5, high)),
+            facade,
+            model.at(22).bits(),
+        );
         if model.at(23).chance(0.5) {
             // A ledge or a canopy over the door.
             let out = side * (away - model.at(24).range(0.5, 1.8));
             let z = model.at(25).range(3.0, 4.0);
             let low = Vec3::new(out.min(near), y + gap + 2.0, z);
-            draft.add(Geometry::span(low, Vec3::new(out.max(near), y + STRETCH - 2.5, z + 0.3)), ground.concrete, own.bits());
+            draft.add(
+                Geometry::span(low, Vec3::new(out.max(near), y + STRETCH - 2.5, z + 0.3)),
+                ground.concrete,
+                own.bits(),
+            );
         }
         if own.at(26).chance(0.6) {
             for panel in 0..1 + own.at(27).index(3) as i64 {
@@ -191,12 +249,32 @@ impl Walk<'_> {
     }
 }
 
-fn garden(draft: &mut Draft, grove: &Grove, kit: &StreetKit, (side, half, y): (f32, f32, f32), own: Seed) {
+fn garden(
+    draft: &mut Draft,
+    grove: &Grove,
+    kit: &StreetKit,
+    (side, half, y): (f32, f32, f32),
+    own: Seed,
+) {
     for plant in 0..5 {
         let tree = own.at(50 + plant);
-        let foot = Vec3::new(side * (half + tree.at(0).range(1.2, 14.0)), y + tree.at(1).range(0.0, STRETCH), 0.0);
-        let species = tree.at(2).pick(&[Species::Broad, Species::Bush, Species::Poplar, Species::Broad, Species::Conifer]);
-        let height = if species == Species::Bush { tree.at(3).range(0.9, 1.8) } else { tree.at(3).range(4.0, 10.0) };
+        let foot = Vec3::new(
+            side * (half + tree.at(0).range(1.2, 14.0)),
+            y + tree.at(1).range(0.0, STRETCH),
+            0.0,
+        );
+        let species = tree.at(2).pick(&[
+            Species::Broad,
+            Species::Bush,
+            Species::Poplar,
+            Species::Broad,
+            Species::Conifer,
+        ]);
+        let height = if species == Species::Bush {
+            tree.at(3).range(0.9, 1.8)
+        } else {
+            tree.at(3).range(4.0, 10.0)
+        };
         grove.plant(draft, species, foot, height, tree);
     }
     if own.at(60).chance(0.4) {
@@ -208,21 +286,38 @@ fn garden(draft: &mut Draft, grove: &Grove, kit: &StreetKit, (side, half, y): (f
 fn arcade(draft: &mut Draft, ground: &Ground, half: f32, y: f32, look: Seed) {
     let high = look.at(10).range(2.9, 3.8);
     let low = Vec3::new(-half - 0.6, y, high);
-    draft.add(Geometry::span(low, Vec3::new(half + 0.6, y + STRETCH, high + 0.35)), ground.glass_roof, look.bits());
+    draft.add(
+        Geometry::span(low, Vec3::new(half + 0.6, y + STRETCH, high + 0.35)),
+        ground.glass_roof,
+        look.bits(),
+    );
     let step = look.at(11).range(3.0, 5.5);
     for column in 0..(STRETCH / step) as i32 {
         for side in [-1.0, 1.0] {
             let base = Vec3::new(side * (half + 0.3), y + step * column as f32, 0.0);
             if look.at(12).chance(0.5) {
-                draft.add(Geometry::Pillar { base, height: high, bottom: 0.22, top: 0.2 }, ground.concrete, look.bits());
+                draft.add(
+                    Geometry::Pillar { base, height: high, bottom: 0.22, top: 0.2 },
+                    ground.concrete,
+                    look.bits(),
+                );
             } else {
                 let size = Vec3::new(0.4, 0.4, high);
-                draft.add(Geometry::block(base + Vec3::Z * (0.5 * high), size, 0.0), ground.concrete, look.bits());
+                draft.add(
+                    Geometry::block(base + Vec3::Z * (0.5 * high), size, 0.0),
+                    ground.concrete,
+                    look.bits(),
+                );
             }
         }
     }
     for lamp in 0..2_u8 {
         let position = Vec3::new(0.0, y + 5.0 + 11.0 * f32::from(lamp), high - 0.15);
-        draft.lamps.push(Lamp { position, colour: Vec3::new(1.0, 0.93, 0.8) * 3.0, reach: 13.0, by_day: false });
+        draft.lamps.push(Lamp {
+            position,
+            colour: Vec3::new(1.0, 0.93, 0.8) * 3.0,
+            reach: 13.0,
+            by_day: false,
+        });
     }
 }

@@ -3,13 +3,13 @@
 use glam::{Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{Plan, level_pose, looking_at, two_traverses};
+use super::{Plan, beside, level_pose, looking_at, two_traverses};
 use crate::{
     geometry::Geometry,
     light::Light,
     material::{Material, rgb},
     parts::{Furnisher, Room},
-    recipe::{Recipe, Refusal, Traverse, between, count},
+    recipe::{Offset, Recipe, Refusal, Traverse, between, count},
     scene::{Draft, Lamp, Scene},
     seed::Seed,
 };
@@ -48,7 +48,15 @@ pub enum Kind {
 
 impl Default for Interior {
     fn default() -> Self {
-        Self { kind: Kind::Corridor, spacing_m: 0.6, width_m: 2.4, blank: 0.35, aliasing: 0.0, places_per_room: 12, eye_m: 1.4 }
+        Self {
+            kind: Kind::Corridor,
+            spacing_m: 0.6,
+            width_m: 2.4,
+            blank: 0.35,
+            aliasing: 0.0,
+            places_per_room: 12,
+            eye_m: 1.4,
+        }
     }
 }
 
@@ -89,7 +97,14 @@ impl Interior {
             Light::indoors(&recipe.queries.condition, seed.named("second light")),
         ];
         let (references, queries) = two_traverses(recipe, &route, seed, |_, _| Vec::new());
-        Plan { scenes, lights, references, queries, grid: Vec::new(), world_from_scene: vpr_core::Pose::identity() }
+        Plan {
+            scenes,
+            lights,
+            references,
+            queries,
+            grid: Vec::new(),
+            world_from_scene: vpr_core::Pose::identity(),
+        }
     }
 
     fn pose(&self, place: usize, seed: Seed) -> vpr_core::Pose {
@@ -98,7 +113,10 @@ impl Interior {
         let north = std::f64::consts::FRAC_PI_2;
         match self.kind {
             Kind::Corridor => level_pose(Vec3::new(0.0, along + 1.0, eye), north),
-            Kind::Escalator => level_pose(Vec3::new(0.0, along, eye + RISE * along), north),
+            Kind::Escalator => {
+                let level = level_pose(Vec3::new(0.0, along, eye + RISE * along), north);
+                beside(&level, &Offset { pitch_deg: 18.0, ..Offset::default() }, seed)
+            }
             Kind::Rooms => {
                 let (number, within) = (place / self.places_per_room, place % self.places_per_room);
                 let room = room(number, seed);
@@ -107,8 +125,12 @@ impl Interior {
                 // From one corner towards the next one, looking across the room.
                 let at = room.low + Vec3::new(0.2 + 0.25 * share, 0.2 + 0.45 * share, 0.0) * size;
                 let turn = share * 1.6 - 0.6;
-                let look = room.low + Vec3::new(0.5 + 0.4 * libm::cosf(turn), 0.5 + 0.4 * libm::sinf(turn), 0.0) * size;
-                let wide = |v: Vec3| nalgebra::Vector3::new(f64::from(v.x), f64::from(v.y), f64::from(v.z));
+                let look = room.low
+                    + Vec3::new(0.5 + 0.4 * libm::cosf(turn), 0.5 + 0.4 * libm::sinf(turn), 0.0)
+                        * size;
+                let wide = |v: Vec3| {
+                    nalgebra::Vector3::new(f64::from(v.x), f64::from(v.y), f64::from(v.z))
+                };
                 let (at, look) = (at + Vec3::Z * eye, look + Vec3::Z * (eye - 0.25));
                 looking_at(wide(at), wide(look))
             }
@@ -120,7 +142,8 @@ impl Interior {
 fn room(number: usize, seed: Seed) -> Room {
     let own = seed.named("room").at(number as i64);
     let low = Vec3::new(20.0 * number as f32, 0.0, 0.0);
-    let size = Vec3::new(own.at(0).range(4.5, 7.5), own.at(1).range(4.5, 8.5), own.at(2).range(2.5, 3.2));
+    let size =
+        Vec3::new(own.at(0).range(4.5, 7.5), own.at(1).range(4.5, 8.5), own.at(2).range(2.5, 3.2));
     Room { low, high: low + size }
 }
 
@@ -157,14 +180,25 @@ impl Visit<'_> {
         for section in 0..(length / SECTION).ceil() as i64 + 2 {
             let look = self.look(section);
             let low = Vec3::new(-half, section as f32 * SECTION, 0.0);
-            let room = Room { low, high: low + Vec3::new(2.0 * half, SECTION, look.at(3).range(2.5, 3.1)) };
+            let room = Room {
+                low,
+                high: low + Vec3::new(2.0 * half, SECTION, look.at(3).range(2.5, 3.1)),
+            };
             self.sides(draft, &room, look);
-            for (corner, inward, key) in [(low, Vec3::X, 0), (low + Vec3::X * 2.0 * half, -Vec3::X, 1)] {
+            for (corner, inward, key) in
+                [(low, Vec3::X, 0), (low + Vec3::X * 2.0 * half, -Vec3::X, 1)]
+            {
                 let wall = (corner, Vec3::Y, inward, SECTION);
                 let blank = self.interior.blank as f32;
                 self.furnisher.wall(draft, wall, blank, look.named("wall").at(key), self.change());
             }
-            self.furnisher.lights(draft, &room, 3.4, self.lit(), self.seed.named("lamps").at(section));
+            self.furnisher.lights(
+                draft,
+                &room,
+                3.4,
+                self.lit(),
+                self.seed.named("lamps").at(section),
+            );
         }
         // The far end.
         let end = draft.material(Material::Door { colour: rgb(150, 60, 50) });
@@ -185,9 +219,20 @@ impl Visit<'_> {
         let (low, high) = (room.low, room.high);
         for x in [low.x, high.x - 0.12] {
             let low = Vec3::new(x, low.y - 0.15, 0.0);
-            draft.add(Geometry::span(low, Vec3::new(x + 0.12, low.y + 0.3, high.z)), beam, look.bits());
+            draft.add(
+                Geometry::span(low, Vec3::new(x + 0.12, low.y + 0.3, high.z)),
+                beam,
+                look.bits(),
+            );
         }
-        draft.add(Geometry::span(Vec3::new(low.x, low.y - 0.15, high.z - 0.25), Vec3::new(high.x, low.y + 0.15, 3.4)), beam, look.bits());
+        draft.add(
+            Geometry::span(
+                Vec3::new(low.x, low.y - 0.15, high.z - 0.25),
+                Vec3::new(high.x, low.y + 0.15, 3.4),
+            ),
+            beam,
+            look.bits(),
+        );
     }
 
     fn rooms(&self, draft: &mut Draft, n: usize) {
@@ -195,12 +240,29 @@ impl Visit<'_> {
             let room = room(number, self.seed);
             let look = self.look(number as i64);
             self.furnisher.shell(draft, &room, look);
-            self.furnisher.furnish(draft, &room, self.interior.blank as f32, look.named("things"), self.change());
-            self.furnisher.lights(draft, &room, 3.0, self.lit(), self.seed.named("lamps").at(number as i64));
+            self.furnisher.furnish(
+                draft,
+                &room,
+                self.interior.blank as f32,
+                look.named("things"),
+                self.change(),
+            );
+            self.furnisher.lights(
+                draft,
+                &room,
+                3.0,
+                self.lit(),
+                self.seed.named("lamps").at(number as i64),
+            );
             let center = (room.low + room.high) * 0.5;
             let size = Vec2::new(look.at(7).range(0.8, 1.5), look.at(8).range(0.7, 1.2));
             let shift = Vec3::new(0.9, 0.6, 0.0);
-            self.furnisher.table(draft, Vec3::new(center.x, center.y, room.low.z) + shift, size, look.named("table"));
+            self.furnisher.table(
+                draft,
+                Vec3::new(center.x, center.y, room.low.z) + shift,
+                size,
+                look.named("table"),
+            );
         }
     }
 
@@ -208,10 +270,18 @@ impl Visit<'_> {
         let length = n as f32 * self.interior.spacing_m as f32 + 14.0;
         let metal = draft.material(Material::Plain { colour: rgb(140, 142, 145), gloss: 0.3 });
         let black = draft.material(Material::Plain { colour: rgb(24, 24, 26), gloss: 0.15 });
-        let tile = draft.material(Material::Checks { first: rgb(216, 214, 205), second: rgb(206, 205, 198), size: 0.3 });
-        let band = draft.material(Material::Checks { first: rgb(40, 80, 130), second: rgb(46, 88, 140), size: 0.3 });
+        let tile = draft.material(Material::Checks {
+            first: rgb(216, 214, 205),
+            second: rgb(206, 205, 198),
+            size: 0.3,
+        });
+        let band = draft.material(Material::Checks {
+            first: rgb(40, 80, 130),
+            second: rgb(46, 88, 140),
+            size: 0.3,
+        });
         let picture = draft.material(Material::Picture);
-        let (left, right) = (-2.6, LANES + 2.6);
+        let (left, right) = (-1.7, LANES + 1.7);
         let up = |y: f32| RISE * y;
         for (x, key) in [(left, 0), (right, 1)] {
             let corner = Vec3::new(x, -6.0, up(-6.0) - 1.0);
@@ -221,10 +291,18 @@ impl Visit<'_> {
             draft.add(Geometry::Patch { corner: corner + v * 2.0, u, v: v * 3.6 }, tile, 2);
             for poster in 0..(length / 2.2) as i64 {
                 let own = self.seed.named("poster").at(key).at(poster);
-                let own = if own.at(5).chance(self.change().1) { self.change().0.at(poster) } else { own };
+                let own = if own.at(5).chance(self.change().1) {
+                    self.change().0.at(poster)
+                } else {
+                    own
+                };
                 let y = poster as f32 * 2.2 + own.at(0).range(0.0, 0.8);
                 let size = Vec3::new(0.06, own.at(1).range(0.5, 1.1), own.at(2).range(0.7, 1.4));
-                draft.add(Geometry::block(Vec3::new(x, y, up(y) + 1.7), size, 0.0), picture, own.bits());
+                draft.add(
+                    Geometry::block(Vec3::new(x, y, up(y) + 1.7), size, 0.0),
+                    picture,
+                    own.bits(),
+                );
             }
         }
         let corner = Vec3::new(left, -6.0, up(-6.0) + 4.4);
@@ -234,20 +312,37 @@ impl Visit<'_> {
             let y = step as f32 * 0.4;
             for lane in [0.0, LANES] {
                 let low = Vec3::new(lane - 0.55, y, up(y) - 0.6);
-                draft.add(Geometry::span(low, Vec3::new(lane + 0.55, y + 0.4, up(y))), metal, step as u32 % 4);
+                draft.add(
+                    Geometry::span(low, Vec3::new(lane + 0.55, y + 0.4, up(y))),
+                    metal,
+                    step as u32 % 4,
+                );
             }
         }
         for x in [-0.75, 0.75, LANES - 0.75, LANES + 0.75] {
             let corner = Vec3::new(x, -6.0, up(-6.0) - 0.8);
             let u = Vec3::new(0.0, length + 12.0, RISE * (length + 12.0));
             draft.add(Geometry::Patch { corner, u, v: Vec3::Z * 1.75 }, metal, 4);
-            draft.add(Geometry::Patch { corner: corner + Vec3::new(-0.06, 0.0, 1.76), u, v: Vec3::X * 0.12 }, black, 4);
+            draft.add(
+                Geometry::Patch {
+                    corner: corner + Vec3::new(-0.06, 0.0, 1.76),
+                    u,
+                    v: Vec3::X * 0.12,
+                },
+                black,
+                4,
+            );
         }
         for lamp in 0..(length / 3.5) as i64 {
             let y = lamp as f32 * 3.5;
             let position = Vec3::new(0.5 * LANES, y, up(y) + 4.0);
             if self.seed.named("lamps").at(lamp).chance(self.lit()) {
-                draft.lamps.push(Lamp { position, colour: Vec3::new(1.0, 0.95, 0.86) * 2.2, reach: 9.0, by_day: true });
+                draft.lamps.push(Lamp {
+                    position,
+                    colour: Vec3::new(1.0, 0.95, 0.86) * 2.2,
+                    reach: 9.0,
+                    by_day: true,
+                });
             }
         }
     }

@@ -16,7 +16,7 @@ pub use street::{Grid, Street};
 
 use glam::Vec3;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
-use vpr_core::{GroundTruth, Poses, PlanarPosition};
+use vpr_core::{GroundTruth, PlanarPosition, Poses};
 
 use crate::{
     camera::Camera,

@@ -63,13 +63,18 @@ impl SevenScenes {
                 let [train, test] = self.paths(folder).map(|path| read_poses(&path));
                 (thinned(&train?, recipe.places), thinned(&test?, n_queries))
             }
-            None => (hand_held(recipe.places, seed.named("train")), hand_held(n_queries, seed.named("test"))),
+            None => (
+                hand_held(recipe.places, seed.named("train")),
+                hand_held(n_queries, seed.named("test")),
+            ),
         };
         let up = train.iter().map(|pose| pose.rotation * -Vector3::y()).sum::<Vector3<f64>>();
         let upright = UnitQuaternion::rotation_between(&up, &Vector3::z())
             .unwrap_or_else(UnitQuaternion::identity);
         let scene_from_world = Isometry3::from_parts(Translation3::identity(), upright);
-        let within = |poses: &[vpr_core::Pose]| -> Vec<_> { poses.iter().map(|pose| scene_from_world * pose).collect() };
+        let within = |poses: &[vpr_core::Pose]| -> Vec<_> {
+            poses.iter().map(|pose| scene_from_world * pose).collect()
+        };
         let (train, test) = (within(&train), within(&test));
         let scenes = vec![
             self.build(&train, &test, &recipe.references, seed, 0),
@@ -90,7 +95,14 @@ impl SevenScenes {
     }
 
     /// A room around all cameras, with 1.6 m between them and the walls.
-    fn build(&self, train: &[vpr_core::Pose], test: &[vpr_core::Pose], traverse: &Traverse, seed: Seed, number: i64) -> Scene {
+    fn build(
+        &self,
+        train: &[vpr_core::Pose],
+        test: &[vpr_core::Pose],
+        traverse: &Traverse,
+        seed: Seed,
+        number: i64,
+    ) -> Scene {
         let centers: Vec<Vec3> = train
             .iter()
             .chain(test)
@@ -99,28 +111,52 @@ impl SevenScenes {
             .collect();
         let low = centers.iter().fold(Vec3::INFINITY, |low, &at| low.min(at));
         let high = centers.iter().fold(Vec3::NEG_INFINITY, |high, &at| high.max(at));
-        let room = Room { low: low - Vec3::new(1.6, 1.6, 1.2), high: high + Vec3::new(1.6, 1.6, 1.1) };
+        let room =
+            Room { low: low - Vec3::new(1.6, 1.6, 1.2), high: high + Vec3::new(1.6, 1.6, 1.1) };
         let mut draft = Draft::default();
         let furnisher = Furnisher::new(&mut draft, seed.named("furnisher"));
         furnisher.shell(&mut draft, &room, seed.named("shell"));
         let changed = traverse.condition.changed as f32;
-        furnisher.furnish(&mut draft, &room, 0.08, seed.named("things"), (seed.named("visit").at(number), changed));
+        furnisher.furnish(
+            &mut draft,
+            &room,
+            0.08,
+            seed.named("things"),
+            (seed.named("visit").at(number), changed),
+        );
         let lit = 1.0 - 0.67 * traverse.condition.darkness as f32;
         furnisher.lights(&mut draft, &room, 2.6, lit, seed.named("lamps"));
         // Tables where no camera passes.
         for table in 0..12 {
             let own = seed.named("table").at(table);
-            let at = Vec3::new(own.at(0).range(room.low.x + 0.9, room.high.x - 0.9), own.at(1).range(room.low.y + 0.9, room.high.y - 0.9), room.low.z);
-            let free = centers.iter().all(|center| Vec2::new(center.x - at.x, center.y - at.y).length() > 0.75);
+            let at = Vec3::new(
+                own.at(0).range(room.low.x + 0.9, room.high.x - 0.9),
+                own.at(1).range(room.low.y + 0.9, room.high.y - 0.9),
+                room.low.z,
+            );
+            let free = centers
+                .iter()
+                .all(|center| Vec2::new(center.x - at.x, center.y - at.y).length() > 0.75);
             if free {
-                furnisher.table(&mut draft, at, Vec2::new(own.at(2).range(0.5, 1.0), own.at(3).range(0.4, 0.8)), own);
+                furnisher.table(
+                    &mut draft,
+                    at,
+                    Vec2::new(own.at(2).range(0.5, 1.0), own.at(3).range(0.4, 0.8)),
+                    own,
+                );
             }
         }
         Scene::new(draft)
     }
 }
 
-fn shots(recipe: &Recipe, traverse: &Traverse, poses: &[vpr_core::Pose], scene: usize, seed: Seed) -> Vec<Shot> {
+fn shots(
+    recipe: &Recipe,
+    traverse: &Traverse,
+    poses: &[vpr_core::Pose],
+    scene: usize,
+    seed: Seed,
+) -> Vec<Shot> {
     let shot = |(index, pose): (usize, &vpr_core::Pose)| Shot {
         pose: *pose,
         camera: recipe.camera,
@@ -142,13 +178,17 @@ fn read_poses(path: &Path) -> vpr_core::Result<Vec<vpr_core::Pose>> {
     let mut rows = Vec::new();
     for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let fields: Vec<&str> = line.split_whitespace().collect();
-        let values: Vec<f64> = fields.iter().skip(1).filter_map(|field| field.parse().ok()).collect();
+        let values: Vec<f64> =
+            fields.iter().skip(1).filter_map(|field| field.parse().ok()).collect();
         if fields.len() != 9 || values.len() != 8 || values.iter().any(|value| !value.is_finite()) {
             let reason = "is not `name qw qx qy qz tx ty tz f`";
             return Err(Error::format(path, format!("line {}", number + 1), reason));
         }
-        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(values[0], values[1], values[2], values[3]));
-        let pose = Isometry3::from_parts(Translation3::new(values[4], values[5], values[6]), rotation);
+        let rotation = UnitQuaternion::from_quaternion(Quaternion::new(
+            values[0], values[1], values[2], values[3],
+        ));
+        let pose =
+            Isometry3::from_parts(Translation3::new(values[4], values[5], values[6]), rotation);
         rows.push((fields[0].to_owned(), pose.inverse()));
     }
     if rows.is_empty() {
@@ -168,19 +208,24 @@ fn thinned(poses: &[vpr_core::Pose], n: usize) -> Vec<vpr_core::Pose> {
 fn hand_held(n: usize, seed: Seed) -> Vec<vpr_core::Pose> {
     let wander = |t: f64, key: i64| {
         let own = seed.at(key);
-        (0..3_u8).map(|wave| {
-            let wave_seed = own.at(i64::from(wave));
-            let speed = f64::from(wave_seed.at(0).range(0.6, 1.6)) * f64::from(1 + wave);
-            let phase = f64::from(wave_seed.at(1).range(0.0, 6.28));
-            libm::sin(t * speed + phase) / f64::from(1 + wave)
-        })
-        .sum::<f64>()
+        (0..3_u8)
+            .map(|wave| {
+                let wave_seed = own.at(i64::from(wave));
+                let speed = f64::from(wave_seed.at(0).range(0.6, 1.6)) * f64::from(1 + wave);
+                let phase = f64::from(wave_seed.at(1).range(0.0, 6.28));
+                libm::sin(t * speed + phase) / f64::from(1 + wave)
+            })
+            .sum::<f64>()
     };
     (0..n)
         .map(|k| {
             let t = 12.0 * k as f64 / n.max(1) as f64;
             let eye = Vector3::new(0.55 * wander(t, 0), 0.4 * wander(t, 1), 0.2 * wander(t, 2));
-            let look = Vector3::new(2.2 + 0.5 * wander(t, 3), 1.2 * wander(t, 4), -0.4 + 0.3 * wander(t, 5));
+            let look = Vector3::new(
+                2.2 + 0.5 * wander(t, 3),
+                1.2 * wander(t, 4),
+                -0.4 + 0.3 * wander(t, 5),
+            );
             looking_at(eye, look)
         })
         .collect()

@@ -71,15 +71,23 @@ const ARCS: [(f64, f64, usize); 3] = [(40.0, 0.5, 49), (25.0, 0.65, 31), (20.0, 
 const BETWEEN: usize = 14;
 
 impl Stage {
-    #[expect(clippy::unused_self, clippy::unnecessary_wraps, reason = "all families are checked alike")]
+    #[expect(
+        clippy::unused_self,
+        clippy::unnecessary_wraps,
+        reason = "all families are checked alike"
+    )]
     pub(crate) fn check(&self) -> Result<(), Refusal> {
         Ok(())
     }
 
     pub(crate) fn plan(&self, recipe: &Recipe, seed: Seed) -> Plan {
         match self.kind {
-            StageKind::LightStageViewpoints => light_stage(recipe, seed, &viewpoints(), &LIGHTS_DEG[4..5]),
-            StageKind::LightStageLights => light_stage(recipe, seed, &viewpoints()[24..25], &LIGHTS_DEG),
+            StageKind::LightStageViewpoints => {
+                light_stage(recipe, seed, &viewpoints(), &LIGHTS_DEG[4..5])
+            }
+            StageKind::LightStageLights => {
+                light_stage(recipe, seed, &viewpoints()[24..25], &LIGHTS_DEG)
+            }
             StageKind::MultiLane => multi_lane(recipe, seed),
             StageKind::MultiIllumination => multi_illumination(recipe, seed),
         }
@@ -96,7 +104,13 @@ pub(crate) fn viewpoints() -> Vec<(f64, f64)> {
     arc(ARCS[0]).chain(between).chain(arc(ARCS[1])).chain(arc(ARCS[2])).collect()
 }
 
-fn shot(recipe: &Recipe, pose: vpr_core::Pose, scene: usize, lamp: Option<Lamp>, seed: Seed) -> Shot {
+fn shot(
+    recipe: &Recipe,
+    pose: vpr_core::Pose,
+    scene: usize,
+    lamp: Option<Lamp>,
+    seed: Seed,
+) -> Shot {
     Shot {
         pose,
         camera: recipe.camera,
@@ -131,7 +145,11 @@ fn light_stage(recipe: &Recipe, seed: Seed, views: &[(f64, f64)], lights: &[(f64
     let lamp = |(azimuth, elevation): (f64, f64)| {
         let (a, e) = (azimuth.to_radians(), elevation.to_radians());
         let level = libm::cos(e);
-        let toward = Vec3::new((level * libm::cos(a)) as f32, (level * libm::sin(a)) as f32, libm::sin(e) as f32);
+        let toward = Vec3::new(
+            (level * libm::cos(a)) as f32,
+            (level * libm::sin(a)) as f32,
+            libm::sin(e) as f32,
+        );
         Lamp { position: toward * 1.1, colour: Vec3::splat(1.6), reach: 9.0, by_day: true }
     };
     let mut queries = Vec::new();
@@ -145,7 +163,14 @@ fn light_stage(recipe: &Recipe, seed: Seed, views: &[(f64, f64)], lights: &[(f64
     }
     let first = pose(viewpoints()[24]);
     let reference = shot(recipe, first, 0, Some(lamp(LIGHTS_DEG[4])), seed.named("reference"));
-    Plan { scenes, lights: vec![light], references: vec![reference], queries, grid: Vec::new(), world_from_scene: vpr_core::Pose::identity() }
+    Plan {
+        scenes,
+        lights: vec![light],
+        references: vec![reference],
+        queries,
+        grid: Vec::new(),
+        world_from_scene: vpr_core::Pose::identity(),
+    }
 }
 
 /// Lane 0 and step 0 are the reference's; queries go lane by lane within each step.
@@ -185,7 +210,12 @@ fn multi_illumination(recipe: &Recipe, seed: Seed) -> Plan {
             let furnisher = Furnisher::new(&mut draft, own.named("furnisher"));
             furnisher.shell(&mut draft, &room, own);
             furnisher.furnish(&mut draft, &room, 0.1, own.named("things"), (own, 0.0));
-            furnisher.table(&mut draft, Vec3::new(2.2, 3.2, 0.0), Vec2::new(1.3, 0.9), own.named("table"));
+            furnisher.table(
+                &mut draft,
+                Vec3::new(2.2, 3.2, 0.0),
+                Vec2::new(1.3, 0.9),
+                own.named("table"),
+            );
             Scene::new(draft)
         })
         .collect();
@@ -199,7 +229,11 @@ fn multi_illumination(recipe: &Recipe, seed: Seed) -> Plan {
         let azimuth = (number % 5) as f32 / 5.0 * std::f32::consts::TAU + 0.3;
         let elevation = (12.0 + 16.0 * (number / 5) as f32).to_radians();
         let level = libm::cosf(elevation);
-        let direction = Vec3::new(level * libm::sinf(azimuth), level * libm::cosf(azimuth), libm::sinf(elevation));
+        let direction = Vec3::new(
+            level * libm::sinf(azimuth),
+            level * libm::cosf(azimuth),
+            libm::sinf(elevation),
+        );
         let origin = Vec3::new(eye.x as f32, eye.y as f32, eye.z as f32);
         let reach = scene.nearest(&Ray { origin, direction }, 20.0).map_or(2.0, |hit| hit.t);
         let position = origin + direction * (reach - 0.25).max(0.1);
@@ -213,7 +247,14 @@ fn multi_illumination(recipe: &Recipe, seed: Seed) -> Plan {
         }
     }
     let reference = shot(recipe, pose, 0, Some(flash(20, &scenes[0])), seed.named("reference"));
-    Plan { scenes, lights: vec![light], references: vec![reference], queries, grid: Vec::new(), world_from_scene: vpr_core::Pose::identity() }
+    Plan {
+        scenes,
+        lights: vec![light],
+        references: vec![reference],
+        queries,
+        grid: Vec::new(),
+        world_from_scene: vpr_core::Pose::identity(),
+    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use object_npy::ground_truth_npy;
 use vpr_core::{
     Error, GroundTruth, Poses,
-    dataset::{Dataset, DatasetEntry, DataRoots, layout::pose_csv::PoseTable},
+    dataset::{DataRoots, Dataset, DatasetEntry, layout::pose_csv::PoseTable},
 };
 
 use crate::{
@@ -118,7 +118,11 @@ pub(crate) fn in_reading_order(layout: Layout, plan: &mut Plan) {
 }
 
 /// What lies beside the images: ground truth, split files, pose tables. Paths and contents.
-pub(crate) fn side_files(recipe: &Recipe, plan: &Plan, truth: &GroundTruth) -> Vec<(PathBuf, Vec<u8>)> {
+pub(crate) fn side_files(
+    recipe: &Recipe,
+    plan: &Plan,
+    truth: &GroundTruth,
+) -> Vec<(PathBuf, Vec<u8>)> {
     let mut files = Vec::new();
     for side in [Side::References, Side::Queries, Side::Grid] {
         let shots = side.shots(plan);
@@ -128,14 +132,25 @@ pub(crate) fn side_files(recipe: &Recipe, plan: &Plan, truth: &GroundTruth) -> V
         files.push((PathBuf::from(side.pose_table()), pose_table(recipe.layout, side, plan)));
         if recipe.layout == Layout::SevenScenes {
             match side {
-                Side::References => files.push((PathBuf::from("TrainSplit.txt"), b"sequence1\n".to_vec())),
-                Side::Queries => files.push((PathBuf::from("TestSplit.txt"), b"sequence2\n".to_vec())),
+                Side::References => {
+                    files.push((PathBuf::from("TrainSplit.txt"), b"sequence1\n".to_vec()))
+                }
+                Side::Queries => {
+                    files.push((PathBuf::from("TestSplit.txt"), b"sequence2\n".to_vec()))
+                }
                 Side::Grid => {}
             }
             for (index, shot) in shots.iter().enumerate() {
                 let image = image_path(recipe.layout, side, index, shot);
-                let name = image.file_name().unwrap_or_default().to_string_lossy().replace(".color.png", ".pose.txt");
-                files.push((image.with_file_name(name), matrix(&(plan.world_from_scene * shot.pose))));
+                let name = image
+                    .file_name()
+                    .unwrap_or_default()
+                    .to_string_lossy()
+                    .replace(".color.png", ".pose.txt");
+                files.push((
+                    image.with_file_name(name),
+                    matrix(&(plan.world_from_scene * shot.pose)),
+                ));
             }
         }
     }
@@ -199,7 +214,11 @@ pub(crate) fn open(recipe: &Recipe, folder: &Path) -> vpr_core::Result<Dataset> 
         let same = images.len() == table.names.len()
             && images.iter().zip(&table.names).all(|(image, name)| image.ends_with(name));
         if !same {
-            return Err(Error::format(folder, "pose tables", "do not list the images that are there"));
+            return Err(Error::format(
+                folder,
+                "pose tables",
+                "do not list the images that are there",
+            ));
         }
     }
     if dataset.poses.is_none() {
@@ -208,7 +227,12 @@ pub(crate) fn open(recipe: &Recipe, folder: &Path) -> vpr_core::Result<Dataset> 
     Ok(dataset)
 }
 
-fn seven_scenes(recipe: &Recipe, folder: &Path, references: &PoseTable, queries: &PoseTable) -> Dataset {
+fn seven_scenes(
+    recipe: &Recipe,
+    folder: &Path,
+    references: &PoseTable,
+    queries: &PoseTable,
+) -> Dataset {
     let paths = |side: Side, table: &PoseTable| -> Vec<PathBuf> {
         let within = folder.join(side.folder(recipe.layout));
         table.names.iter().map(|name| within.join(name)).collect()

@@ -15,7 +15,9 @@ pub(crate) fn ground_truth_npy(truth: &GroundTruth) -> Vec<u8> {
     bytes.resize(10 + padded - 1, b' ');
     bytes.push(b'\n');
     // Protocol 3; _reconstruct(ndarray, (0,), b"b").
-    bytes.extend(b"\x80\x03cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85C\x01b\x87R");
+    bytes.extend(
+        b"\x80\x03cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85C\x01b\x87R",
+    );
     // State: version 1, shape, dtype("O8"), C order, items.
     bytes.extend(b"(K\x01");
     push_int(&mut bytes, n);
@@ -28,7 +30,10 @@ pub(crate) fn ground_truth_npy(truth: &GroundTruth) -> Vec<u8> {
             push_int(&mut bytes, -1);
         }
         for &reference in truth.correct(query) {
-            push_int(&mut bytes, i32::try_from(reference).expect("recipes allow 40 000 references"));
+            push_int(
+                &mut bytes,
+                i32::try_from(reference).expect("recipes allow 40 000 references"),
+            );
         }
         bytes.push(b'e');
     }

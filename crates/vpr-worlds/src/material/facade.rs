@@ -117,7 +117,13 @@ impl Facade {
     }
 
     /// `at` is measured from the middle of the bay and the floor's level.
-    fn window_bay(&self, at: Vec2, width: f32, (bay, level): (i32, i32), place: &Place<'_>) -> Paint {
+    fn window_bay(
+        &self,
+        at: Vec2,
+        width: f32,
+        (bay, level): (i32, i32),
+        place: &Place<'_>,
+    ) -> Paint {
         let Opening { share, sill, height, arched, shutters, inset, .. } = self.opening;
         let half = 0.5 * share * width;
         let top = sill + height;
@@ -132,12 +138,20 @@ impl Facade {
             let behind = at + place.slide * inset;
             if inside(behind) {
                 let own = cell(place.touch.seed ^ 0x77, bay, level);
-                let within = Vec2::new((behind.x + half) / (2.0 * half), (behind.y - sill) / height);
+                let within =
+                    Vec2::new((behind.x + half) / (2.0 * half), (behind.y - sill) / height);
                 let size = Vec2::new(2.0 * half, height);
-                return Paint { sunk: inset * place.stretch, ..self.glass(own, within, size, place) };
+                return Paint {
+                    sunk: inset * place.stretch,
+                    ..self.glass(own, within, size, place)
+                };
             }
             // The reveal: somewhere between the face and the glass.
-            return Paint { open: 0.5, sunk: 0.5 * inset * place.stretch, ..Paint::matt(self.trim * 0.7) };
+            return Paint {
+                open: 0.5,
+                sunk: 0.5 * inset * place.stretch,
+                ..Paint::matt(self.trim * 0.7)
+            };
         }
         if self.bands && at.y < 0.22 {
             return Paint::matt(self.trim * if at.y < 0.05 { 0.55 } else { 0.95 });
@@ -177,7 +191,8 @@ impl Facade {
         let lit = self.lit(own, place.season);
         let blind = unit(mix(own ^ 1)) * 0.8;
         let drawn = unit(mix(own ^ 2)) < 0.45 && 1.0 - within.y < blind;
-        let gathered = unit(mix(own ^ 3)) < 0.5 && (within.x - 0.5).abs() > 0.5 - 0.22 * unit(mix(own ^ 4));
+        let gathered =
+            unit(mix(own ^ 3)) < 0.5 && (within.x - 0.5).abs() > 0.5 - 0.22 * unit(mix(own ^ 4));
         let cloth = hue(unit(mix(own ^ 5)), 0.15, lerp(0.6, 0.95, unit(mix(own ^ 6))));
         let behind = if drawn || gathered { cloth * 0.55 } else { Vec3::splat(0.02) };
         let glow = if drawn || gathered { cloth } else { Vec3::new(1.0, 0.8, 0.5) } * lit;
@@ -202,7 +217,10 @@ impl Facade {
                 let margin = 0.5 * (spot.extent.x / n - 2.7);
                 if x > margin && x < margin + 2.7 && spot.uv.y < 2.5 {
                     let slat = (spot.uv.y * 6.0).rem_euclid(1.0) < 0.12;
-                    return Paint { sunk: 0.15 * place.stretch, ..Paint::matt(colour * if slat { 0.55 } else { 0.9 }) };
+                    return Paint {
+                        sunk: 0.15 * place.stretch,
+                        ..Paint::matt(colour * if slat { 0.55 } else { 0.9 })
+                    };
                 }
                 self.bare(place)
             }
@@ -226,12 +244,20 @@ impl Facade {
         let behind = Vec2::new(x, spot.uv.y) + place.slide * 0.25;
         if x.abs() < 0.6 && spot.uv.y < 2.75 {
             if behind.x.abs() > 0.6 || behind.y > 2.75 {
-                return Paint { open: 0.5, sunk: 0.12 * place.stretch, ..Paint::matt(self.trim * 0.6) };
+                return Paint {
+                    open: 0.5,
+                    sunk: 0.12 * place.stretch,
+                    ..Paint::matt(self.trim * 0.6)
+                };
             }
             let sunk = 0.25 * place.stretch;
             if behind.y > 2.2 {
                 let own = mix(*seed ^ 0xd1);
-                return Paint { sunk, glow: self.lit(own, place.season), ..Paint::glossy(Vec3::splat(0.04), 0.3) };
+                return Paint {
+                    sunk,
+                    glow: self.lit(own, place.season),
+                    ..Paint::glossy(Vec3::splat(0.04), 0.3)
+                };
             }
             let panel = (behind.x.abs() - 0.4).abs() < 0.03 || (behind.y - 1.05).abs() < 0.05;
             return Paint { sunk, ..Paint::glossy(door * if panel { 0.5 } else { 1.0 }, 0.08) };
@@ -252,7 +278,8 @@ impl Facade {
             if !(0.03..=0.97).contains(&across) || up > 1.0 {
                 return self.bare(place);
             }
-            let colour = ground.lerp(ink, lettering::line(shop, Vec2::new(across, up), spot.extent.x / 0.75));
+            let colour = ground
+                .lerp(ink, lettering::line(shop, Vec2::new(across, up), spot.extent.x / 0.75));
             let lit = if unit(mix(shop ^ 2)) < 0.7 { 0.6 * night } else { 0.0 };
             return Paint { glow: colour * lit, ..Paint::matt(colour) };
         }
@@ -265,10 +292,18 @@ impl Facade {
         if (u - door).abs() < 0.5 {
             let at = Vec2::new(u - door, v) + place.slide * 0.5;
             if at.x.abs() > 0.5 {
-                return Paint { open: 0.4, sunk: 0.25 * place.stretch, ..Paint::matt(ground * 0.5) };
+                return Paint {
+                    open: 0.4,
+                    sunk: 0.25 * place.stretch,
+                    ..Paint::matt(ground * 0.5)
+                };
             }
             let rail = at.x.abs() > 0.42 || (at.y - 1.0).abs() < 0.06 || at.y < 0.25 || at.y > 2.1;
-            let paint = if rail { Paint::matt(ground * 0.7) } else { Paint::glossy(Vec3::splat(0.04), 0.35) };
+            let paint = if rail {
+                Paint::matt(ground * 0.7)
+            } else {
+                Paint::glossy(Vec3::splat(0.04), 0.35)
+            };
             return Paint { sunk: 0.5 * place.stretch, ..paint };
         }
         let riser = seed.at(2).range(0.2, 0.7);
@@ -286,7 +321,11 @@ impl Facade {
         let middle = (at / Vec2::new(0.55, 0.5)) - block - Vec2::splat(0.5);
         let reach = 0.15 + 0.33 * unit(mix(own ^ 1));
         let thing = unit(own) < 0.6 && middle.abs().max_element() < reach;
-        let colour = if thing { hue(unit(mix(own ^ 2)), 0.6, 0.8) } else { ground * 0.12 + Vec3::splat(0.03) };
+        let colour = if thing {
+            hue(unit(mix(own ^ 2)), 0.6, 0.8)
+        } else {
+            ground * 0.12 + Vec3::splat(0.03)
+        };
         Paint { glow: colour * 0.7 * night, open: 0.6, ..Paint::glossy(colour * 0.6, 0.22) }
     }
 }

@@ -80,7 +80,9 @@ mod tests {
     fn names_differ_and_have_ink() {
         let ink = |seed: u32| -> Vec<bool> {
             (0..60 * 8)
-                .map(|k| line(seed, Vec2::new((k % 60) as f32 / 60.0, (k / 60) as f32 / 8.0), 6.0) > 0.5)
+                .map(|k| {
+                    line(seed, Vec2::new((k % 60) as f32 / 60.0, (k / 60) as f32 / 8.0), 6.0) > 0.5
+                })
                 .collect()
         };
         assert!(ink(1).iter().filter(|&&dot| dot).count() > 40);

@@ -61,8 +61,6 @@ pub(crate) enum Material {
     Outlook,
     /// Car body with a dark band of windows in the upper part.
     Car { colour: Colour },
-    /// Clothes: trousers below, coat above.
-    Clothes { top: Colour, bottom: Colour },
     /// Checked cloth, curtains, carpets.
     Cloth { colour: Colour, other: Colour, size: f32 },
 }
@@ -174,18 +172,16 @@ impl Material {
                 let aspect = spot.extent.x / spot.extent.y;
                 let ink_here = lettering::line(seed, Vec2::new(u, v), aspect);
                 let colour = ground.lerp(*ink, ink_here);
-                let glow = if *lit { colour * 0.9 * step(0.4, 0.7, season.night) } else { Vec3::ZERO };
+                let glow =
+                    if *lit { colour * 0.9 * step(0.4, 0.7, season.night) } else { Vec3::ZERO };
                 Paint { glow, ..Paint::matt(colour) }
             }
             Self::Door { colour } => door(*colour, touch),
             Self::Outlook => outlook(touch, season),
             Self::Car { colour } => car(*colour, touch),
-            Self::Clothes { top, bottom } => {
-                let height = spot.uv.y / spot.extent.y;
-                Paint::matt(if height < 0.5 { *bottom } else { *top })
-            }
             Self::Cloth { colour, other, size } => {
-                let at = if spot.normal.z.abs() > 0.7 { Vec2::new(point.x, point.y) } else { spot.uv };
+                let at =
+                    if spot.normal.z.abs() > 0.7 { Vec2::new(point.x, point.y) } else { spot.uv };
                 let band = ((at / *size).floor().element_sum() as i32).rem_euclid(2) == 0;
                 let fuzz = cloudy(seed, at * 20.0, 2, 20.0 * footprint);
                 Paint::matt((if band { *colour } else { *other }) * lerp(0.8, 1.15, fuzz))
@@ -207,7 +203,8 @@ fn tiles(colour: Colour, size: f32, touch: &Touch) -> Paint {
 
 fn foliage(colour: Colour, evergreen: bool, touch: &Touch, season: &Season) -> Paint {
     let clump = value(touch.seed, touch.spot.uv * 2.4);
-    let fine = if touch.footprint < 0.12 { value(touch.seed ^ 5, touch.spot.uv * 9.0) } else { 0.5 };
+    let fine =
+        if touch.footprint < 0.12 { value(touch.seed ^ 5, touch.spot.uv * 9.0) } else { 0.5 };
     let gold = rgb(196, 120, 38).lerp(rgb(150, 60, 30), unit(mix(touch.seed)));
     let turned = if evergreen { colour } else { colour.lerp(gold, season.autumn) };
     let bare = if evergreen { 0.0 } else { season.bare };
@@ -251,7 +248,12 @@ fn boards(colour: Colour, width: f32, touch: &Touch) -> Paint {
     let row = (touch.spot.uv.y / width).floor();
     let own = unit(cell(touch.seed, row as i32, 3));
     let along = touch.spot.uv.x + 9.0 * own;
-    let grain = cloudy(touch.seed, Vec2::new(along * 1.2, touch.spot.uv.y * 24.0), 3, 24.0 * touch.footprint);
+    let grain = cloudy(
+        touch.seed,
+        Vec2::new(along * 1.2, touch.spot.uv.y * 24.0),
+        3,
+        24.0 * touch.footprint,
+    );
     let joint = (touch.spot.uv.y / width - row - 0.5).abs();
     let seen = step(0.5 * width, 0.1 * width, touch.footprint);
     let line = 1.0 - 0.55 * seen * step(0.45, 0.49, joint);
@@ -264,7 +266,10 @@ fn shelf(colour: Colour, touch: &Touch) -> Paint {
     }
     let row = (touch.spot.uv.y / 0.38).floor();
     let up = touch.spot.uv.y / 0.38 - row;
-    if !(0.07..=0.97).contains(&up) || touch.spot.uv.x < 0.04 || touch.spot.uv.x > touch.spot.extent.x - 0.04 {
+    if !(0.07..=0.97).contains(&up)
+        || touch.spot.uv.x < 0.04
+        || touch.spot.uv.x > touch.spot.extent.x - 0.04
+    {
         return Paint::matt(colour);
     }
     // Books of varied width: a walk over hashed cells of 0.24 m, each split in hashed parts.
@@ -293,7 +298,8 @@ fn door(colour: Colour, touch: &Touch) -> Paint {
         let edge = (x - 0.34).abs() < 0.02 && at.y > low && at.y < high;
         edge || (x < 0.34 && ((at.y - low).abs() < 0.012 || (at.y - high).abs() < 0.012))
     };
-    let glazed = touch.seed.is_multiple_of(3) && (at.x - 0.5).abs() < 0.3 && (0.56..0.9).contains(&at.y);
+    let glazed =
+        touch.seed.is_multiple_of(3) && (at.x - 0.5).abs() < 0.3 && (0.56..0.9).contains(&at.y);
     if handle {
         return Paint::glossy(Vec3::splat(0.6), 0.4);
     }
@@ -308,7 +314,8 @@ fn outlook(touch: &Touch, season: &Season) -> Paint {
     let at = touch.spot.uv / touch.spot.extent;
     let panes = 1.0 + (touch.seed % 3) as f32;
     let bar = |x: f32, n: f32| (x * n - (x * n).round()).abs() / n;
-    let frame = bar(at.x, panes) * touch.spot.extent.x < 0.04 || bar(at.y, 1.0) * touch.spot.extent.y < 0.05;
+    let frame = bar(at.x, panes) * touch.spot.extent.x < 0.04
+        || bar(at.y, 1.0) * touch.spot.extent.y < 0.05;
     if frame {
         return Paint::matt(Vec3::splat(0.75));
     }
@@ -316,7 +323,11 @@ fn outlook(touch: &Touch, season: &Season) -> Paint {
     let through = at + Vec2::new(touch.view.x, touch.view.y) / touch.view.z.min(-0.2) * -0.8;
     let line = 0.35 + 0.25 * value(touch.seed, Vec2::new(through.x * 4.0, 0.5));
     let sky = rgb(205, 222, 240) * 2.2;
-    let far = if through.y > line { sky } else { rgb(80, 105, 70) * lerp(0.6, 1.6, value(touch.seed ^ 1, through * 14.0)) };
+    let far = if through.y > line {
+        sky
+    } else {
+        rgb(80, 105, 70) * lerp(0.6, 1.6, value(touch.seed ^ 1, through * 14.0))
+    };
     let day = 1.0 - step(0.3, 0.8, season.night);
     Paint { glow: far * day, ..Paint::glossy(Vec3::splat(0.02), 0.3) }
 }

@@ -16,7 +16,8 @@ pub(crate) fn poster(seed: u32, at: Vec2, footprint: f32) -> Colour {
     if edge < 0.035 {
         return frame;
     }
-    let ground = hue(random.at(4).unit(), random.at(5).range(0.1, 0.7), random.at(6).range(0.35, 0.95));
+    let ground =
+        hue(random.at(4).unit(), random.at(5).range(0.1, 0.7), random.at(6).range(0.35, 0.95));
     let ink = hue(random.at(7).unit(), random.at(8).range(0.3, 0.9), random.at(9).range(0.1, 0.9));
     match random.at(10).index(4) {
         0 => landscape(random, at, ground, ink),
@@ -37,7 +38,8 @@ fn landscape(random: Seed, at: Vec2, ground: Colour, ink: Colour) -> Colour {
     }
     for ridge in 0..3_u8 {
         let seed = random.at(21 + i64::from(ridge)).bits();
-        let height = 0.65 - 0.2 * f32::from(ridge) + 0.25 * (value(seed, Vec2::new(at.x * 4.0, 0.5)) - 0.5);
+        let height =
+            0.65 - 0.2 * f32::from(ridge) + 0.25 * (value(seed, Vec2::new(at.x * 4.0, 0.5)) - 0.5);
         if at.y < height {
             colour = ink * (0.4 + 0.25 * f32::from(ridge));
         }

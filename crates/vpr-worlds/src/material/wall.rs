@@ -23,11 +23,6 @@ pub(crate) enum Wall {
     Clapboard,
 }
 
-impl Wall {
-    pub(crate) const ALL: [Self; 5] =
-        [Self::Brick, Self::Plaster, Self::Stone, Self::Concrete, Self::Clapboard];
-}
-
 /// A wall of this kind and colour, stained towards the ground and below its top.
 pub(crate) fn wall(kind: Wall, colour: Colour, touch: &Touch) -> Paint {
     let at = touch.spot.uv;
@@ -39,7 +34,9 @@ pub(crate) fn wall(kind: Wall, colour: Colour, touch: &Touch) -> Paint {
         Wall::Brick => bricks(at, Vec2::new(0.24, 0.08), 0.012, 0.45, touch),
         Wall::Stone => bricks(at, Vec2::new(0.9, 0.42), 0.02, 0.3, touch),
         Wall::Concrete => bricks(at, Vec2::new(2.4, 1.4), 0.02, 0.12, touch),
-        Wall::Plaster => 1.0 + 0.06 * (cloudy(touch.seed ^ 5, at * 9.0, 2, 9.0 * touch.footprint) - 0.5),
+        Wall::Plaster => {
+            1.0 + 0.06 * (cloudy(touch.seed ^ 5, at * 9.0, 2, 9.0 * touch.footprint) - 0.5)
+        }
         Wall::Clapboard => {
             let up = at.y / 0.16 - (at.y / 0.16).floor();
             1.0 - 0.4 * step(0.08, 0.02, touch.footprint) * step(0.8, 0.98, up)
@@ -58,5 +55,9 @@ fn bricks(at: Vec2, size: Vec2, joint: f32, spread: f32, touch: &Touch) -> f32 {
     let within = Vec2::new((at.x / size.x + shift - column) * size.x, at.y - row * size.y);
     let edge = within.min(size - within).min_element();
     let seen = step(size.y, 0.25 * size.y, touch.footprint);
-    if edge < joint && seen > 0.05 { -0.7 * seen } else { 1.0 + spread * own * step(size.x, 0.3 * size.x, touch.footprint) }
+    if edge < joint && seen > 0.05 {
+        -0.7 * seen
+    } else {
+        1.0 + spread * own * step(size.x, 0.3 * size.x, touch.footprint)
+    }
 }

@@ -71,7 +71,15 @@ impl Lot {
 impl Style {
     /// A kind of house for a city with this seed.
     pub(crate) fn new(seed: Seed) -> Self {
-        let wall = seed.at(0).pick(&[Wall::Brick, Wall::Brick, Wall::Plaster, Wall::Plaster, Wall::Stone, Wall::Concrete, Wall::Clapboard]);
+        let wall = seed.at(0).pick(&[
+            Wall::Brick,
+            Wall::Brick,
+            Wall::Plaster,
+            Wall::Plaster,
+            Wall::Stone,
+            Wall::Concrete,
+            Wall::Clapboard,
+        ]);
         let tall = seed.at(1).chance(0.5);
         let share = if tall { seed.at(2).range(0.32, 0.5) } else { seed.at(2).range(0.45, 0.78) };
         let floor = seed.at(3).range(2.8, 3.7);
@@ -85,8 +93,16 @@ impl Style {
             shutters: seed.at(8).chance(0.25).then(|| hue(seed.at(9).unit(), 0.5, 0.45)),
             inset: seed.at(10).range(0.08, 0.28),
         };
-        let trim = if seed.at(11).chance(0.7) { rgb(214, 206, 190) } else { wall_colour(wall, seed.at(12)) * 0.6 };
-        let frame = if seed.at(13).chance(0.7) { rgb(228, 226, 220) } else { hue(seed.at(14).unit(), 0.5, 0.3) };
+        let trim = if seed.at(11).chance(0.7) {
+            rgb(214, 206, 190)
+        } else {
+            wall_colour(wall, seed.at(12)) * 0.6
+        };
+        let frame = if seed.at(13).chance(0.7) {
+            rgb(228, 226, 220)
+        } else {
+            hue(seed.at(14).unit(), 0.5, 0.3)
+        };
         let facade = Facade {
             wall,
             colour: wall_colour(wall, seed.at(15)),
@@ -105,7 +121,12 @@ impl Style {
         Self {
             facade,
             roof: seed.at(21).pick(&[Roof::Flat, Roof::Flat, Roof::Saddle, Roof::Gable, Roof::Hip]),
-            tiles: seed.at(22).pick(&[rgb(140, 72, 52), rgb(88, 84, 86), rgb(112, 92, 76), rgb(70, 76, 88)]),
+            tiles: seed.at(22).pick(&[
+                rgb(140, 72, 52),
+                rgb(88, 84, 86),
+                rgb(112, 92, 76),
+                rgb(70, 76, 88),
+            ]),
             floors: (low, low + 1 + seed.at(23).index(3)),
             cornice: seed.at(24).chance(0.6),
             balconies: seed.at(25).chance(0.25),
@@ -117,11 +138,23 @@ impl Style {
 
 fn wall_colour(wall: Wall, seed: Seed) -> Colour {
     match wall {
-        Wall::Brick => seed.at(0).pick(&[rgb(150, 82, 62), rgb(128, 66, 52), rgb(176, 128, 88), rgb(110, 74, 64), rgb(190, 160, 120)]),
-        Wall::Plaster => hue(seed.at(0).range(0.0, 0.2), seed.at(1).range(0.05, 0.4), seed.at(2).range(0.65, 0.95)),
+        Wall::Brick => seed.at(0).pick(&[
+            rgb(150, 82, 62),
+            rgb(128, 66, 52),
+            rgb(176, 128, 88),
+            rgb(110, 74, 64),
+            rgb(190, 160, 120),
+        ]),
+        Wall::Plaster => hue(
+            seed.at(0).range(0.0, 0.2),
+            seed.at(1).range(0.05, 0.4),
+            seed.at(2).range(0.65, 0.95),
+        ),
         Wall::Stone => rgb(176, 166, 148) * seed.at(0).range(0.7, 1.15),
         Wall::Concrete => rgb(150, 150, 148) * seed.at(0).range(0.6, 1.15),
-        Wall::Clapboard => hue(seed.at(0).unit(), seed.at(1).range(0.05, 0.35), seed.at(2).range(0.6, 0.95)),
+        Wall::Clapboard => {
+            hue(seed.at(0).unit(), seed.at(1).range(0.05, 0.35), seed.at(2).range(0.6, 0.95))
+        }
     }
 }
 
@@ -129,15 +162,21 @@ fn wall_colour(wall: Wall, seed: Seed) -> Colour {
 pub(crate) fn house(draft: &mut Draft, lot: &Lot, style: &Style, look: Seed, shop: Seed) {
     let mut facade = style.facade.clone();
     facade.face = if lot.side > 0.0 { 0 } else { 1 };
-    facade.colour = (facade.colour * look.at(0).range(0.8, 1.2)).lerp(wall_colour(facade.wall, look.at(1)), 0.45);
+    facade.colour = (facade.colour * look.at(0).range(0.8, 1.2))
+        .lerp(wall_colour(facade.wall, look.at(1)), 0.45);
     facade.bay *= look.at(2).range(0.85, 1.2);
     if look.at(3).chance(0.3) {
         facade.opening.shutters = Some(hue(look.at(4).unit(), 0.45, 0.4));
     }
     let is_shop = look.at(5).chance(style.shops);
     facade.front = if is_shop {
-        let ground = hue(shop.at(1).unit(), shop.at(2).range(0.2, 0.8), shop.at(3).range(0.15, 0.6));
-        let ink = if shop.at(4).chance(0.6) { rgb(240, 236, 220) } else { hue(shop.at(5).unit(), 0.7, 0.9) };
+        let ground =
+            hue(shop.at(1).unit(), shop.at(2).range(0.2, 0.8), shop.at(3).range(0.15, 0.6));
+        let ink = if shop.at(4).chance(0.6) {
+            rgb(240, 236, 220)
+        } else {
+            hue(shop.at(5).unit(), 0.7, 0.9)
+        };
         Front::Shop { ground, ink, shop: shop.bits() }
     } else if look.at(6).chance(0.15) {
         Front::Garage { colour: hue(look.at(7).unit(), 0.3, 0.5) }
@@ -162,7 +201,12 @@ pub(crate) fn house(draft: &mut Draft, lot: &Lot, style: &Style, look: Seed, sho
     if jut && n_floors > 0 {
         let middle = lot.span.0 + lot.width() * look.at(13).range(0.3, 0.7);
         let narrow = Lot { span: (middle - 1.3, middle + 1.3), ..*lot };
-        let bay = Facade { bay: 2.6, opening: Opening { share: 0.8, ..facade.opening }, face: 255, ..facade };
+        let bay = Facade {
+            bay: 2.6,
+            opening: Opening { share: 0.8, ..facade.opening },
+            face: 255,
+            ..facade
+        };
         let bay = draft.material(Material::Facade(Box::new(bay)));
         // Its lower edge is where the ground floor would end: windows line up with the house's.
         let block = narrow.block(0.9, 0.1, ground - 0.05, eaves - 0.6, 0.0);
@@ -172,9 +216,15 @@ pub(crate) fn house(draft: &mut Draft, lot: &Lot, style: &Style, look: Seed, sho
     }
 }
 
-fn balconies(draft: &mut Draft, lot: &Lot, (ground, floor, n_floors): (f32, f32, usize), look: Seed) {
+fn balconies(
+    draft: &mut Draft,
+    lot: &Lot,
+    (ground, floor, n_floors): (f32, f32, usize),
+    look: Seed,
+) {
     let slab = draft.material(Material::Plain { colour: rgb(150, 146, 140), gloss: 0.0 });
-    let rail = draft.material(Material::Plain { colour: hue(look.at(30).unit(), 0.3, 0.3), gloss: 0.1 });
+    let rail =
+        draft.material(Material::Plain { colour: hue(look.at(30).unit(), 0.3, 0.3), gloss: 0.1 });
     let margin = lot.width() * look.at(31).range(0.1, 0.32);
     for level in 0..n_floors {
         let z = ground + floor * level as f32;
@@ -186,7 +236,11 @@ fn balconies(draft: &mut Draft, lot: &Lot, (ground, floor, n_floors): (f32, f32,
             let n = (lot.width() - 2.0 * margin) / 0.45;
             for post in 0..=n as usize {
                 let foot = lot.at(1.08, margin + post as f32 * 0.45, z);
-                draft.add(Geometry::Pillar { base: foot, height: 0.92, bottom: 0.025, top: 0.025 }, rail, 0);
+                draft.add(
+                    Geometry::Pillar { base: foot, height: 0.92, bottom: 0.025, top: 0.025 },
+                    rail,
+                    0,
+                );
             }
         }
     }
@@ -194,15 +248,26 @@ fn balconies(draft: &mut Draft, lot: &Lot, (ground, floor, n_floors): (f32, f32,
 
 fn awning(draft: &mut Draft, lot: &Lot, ground: f32, shop: Seed) {
     let first = hue(shop.at(7).unit(), 0.7, 0.6);
-    let cloth = draft.material(Material::Cloth { colour: first, other: rgb(235, 232, 225), size: shop.at(8).range(0.3, 0.8) });
+    let cloth = draft.material(Material::Cloth {
+        colour: first,
+        other: rgb(235, 232, 225),
+        size: shop.at(8).range(0.3, 0.8),
+    });
     let width = lot.width() - 0.6;
     let corner = lot.at(0.02, 0.3, ground - 0.85);
     let v = Vec3::new(lot.side * 1.4, 0.0, -0.6);
-    draft.add(Geometry::Patch { corner, u: Vec3::new(0.0, width, 0.0), v }, cloth, shop.at(9).bits());
+    draft.add(
+        Geometry::Patch { corner, u: Vec3::new(0.0, width, 0.0), v },
+        cloth,
+        shop.at(9).bits(),
+    );
 }
 
 fn roof(draft: &mut Draft, lot: &Lot, style: &Style, facade: &Facade, eaves: f32, look: Seed) {
-    let tiles = draft.material(Material::Tiles { colour: style.tiles * look.at(40).range(0.8, 1.25), size: 0.32 });
+    let tiles = draft.material(Material::Tiles {
+        colour: style.tiles * look.at(40).range(0.8, 1.25),
+        size: 0.32,
+    });
     let gable = draft.material(Material::Wall { kind: facade.wall, colour: facade.colour });
     let (w, d) = (lot.width(), lot.depth);
     let rise = look.at(41).range(0.35, 0.65);
@@ -219,7 +284,13 @@ fn roof(draft: &mut Draft, lot: &Lot, style: &Style, facade: &Facade, eaves: f32
             let z = rise * 0.5 * d;
             let ridge = (corner(-0.5 * d, 0.0, z), corner(-0.5 * d, w, z));
             slope(corner(0.3, 0.0, -0.2), corner(0.3, w, -0.2), ridge.1, Some(ridge.0), tiles);
-            slope(corner(-d - 0.3, 0.0, -0.2), corner(-d - 0.3, w, -0.2), ridge.1, Some(ridge.0), tiles);
+            slope(
+                corner(-d - 0.3, 0.0, -0.2),
+                corner(-d - 0.3, w, -0.2),
+                ridge.1,
+                Some(ridge.0),
+                tiles,
+            );
             slope(corner(0.0, 0.0, 0.0), corner(-d, 0.0, 0.0), ridge.0, None, gable);
             slope(corner(0.0, w, 0.0), corner(-d, w, 0.0), ridge.1, None, gable);
             z
@@ -227,8 +298,20 @@ fn roof(draft: &mut Draft, lot: &Lot, style: &Style, facade: &Facade, eaves: f32
         Roof::Gable => {
             let z = (rise + 0.25) * 0.5 * w;
             let ridge = (corner(0.0, 0.5 * w, z), corner(-d, 0.5 * w, z));
-            slope(corner(0.2, 0.0, -0.1), corner(-d, 0.0, -0.1), ridge.1, Some(corner(0.2, 0.5 * w, z)), tiles);
-            slope(corner(0.2, w, -0.1), corner(-d, w, -0.1), ridge.1, Some(corner(0.2, 0.5 * w, z)), tiles);
+            slope(
+                corner(0.2, 0.0, -0.1),
+                corner(-d, 0.0, -0.1),
+                ridge.1,
+                Some(corner(0.2, 0.5 * w, z)),
+                tiles,
+            );
+            slope(
+                corner(0.2, w, -0.1),
+                corner(-d, w, -0.1),
+                ridge.1,
+                Some(corner(0.2, 0.5 * w, z)),
+                tiles,
+            );
             slope(corner(0.0, 0.0, 0.0), corner(0.0, w, 0.0), ridge.0, None, gable);
             slope(corner(-d, 0.0, 0.0), corner(-d, w, 0.0), ridge.1, None, gable);
             z
@@ -237,7 +320,13 @@ fn roof(draft: &mut Draft, lot: &Lot, style: &Style, facade: &Facade, eaves: f32
             let z = rise * 0.5 * d.min(w);
             let inset = 0.5 * d.min(w);
             let ridge = (corner(-0.5 * d, inset, z), corner(-0.5 * d, w - inset, z));
-            slope(corner(0.3, -0.2, -0.1), corner(0.3, w + 0.2, -0.1), ridge.1, Some(ridge.0), tiles);
+            slope(
+                corner(0.3, -0.2, -0.1),
+                corner(0.3, w + 0.2, -0.1),
+                ridge.1,
+                Some(ridge.0),
+                tiles,
+            );
             slope(corner(-d, 0.0, 0.0), corner(-d, w, 0.0), ridge.1, Some(ridge.0), tiles);
             slope(corner(0.0, 0.0, 0.0), corner(-d, 0.0, 0.0), ridge.0, None, tiles);
             slope(corner(0.0, w, 0.0), corner(-d, w, 0.0), ridge.1, None, tiles);
@@ -256,7 +345,11 @@ fn chimneys(draft: &mut Draft, lot: &Lot, eaves: f32, top: f32, wall: u32, look:
     for number in 0..look.at(50).index(3) as i64 {
         let own = look.at(51 + number);
         let size = Vec2::new(own.at(0).range(0.4, 1.6), own.at(1).range(0.4, 1.2));
-        let foot = lot.at(-lot.depth * own.at(2).range(0.2, 0.7), lot.width() * own.at(3).range(0.1, 0.9), eaves);
+        let foot = lot.at(
+            -lot.depth * own.at(2).range(0.2, 0.7),
+            lot.width() * own.at(3).range(0.1, 0.9),
+            eaves,
+        );
         let high = top + own.at(4).range(0.6, 1.4);
         let low = foot - Vec3::new(0.5 * size.x, 0.5 * size.y, 0.0);
         draft.add(Geometry::span(low, low + Vec3::new(size.x, size.y, high)), wall, own.bits());

@@ -25,11 +25,19 @@ pub(crate) struct StreetKit {
 impl StreetKit {
     pub(crate) fn new(draft: &mut Draft, seed: Seed) -> Self {
         let metal = hue(seed.at(0).unit(), 0.3, seed.at(1).range(0.15, 0.45));
-        let cars = [rgb(190, 192, 195), rgb(40, 42, 48), rgb(150, 26, 30), rgb(38, 66, 120), rgb(225, 224, 218), rgb(92, 104, 84)];
+        let cars = [
+            rgb(190, 192, 195),
+            rgb(40, 42, 48),
+            rgb(150, 26, 30),
+            rgb(38, 66, 120),
+            rgb(225, 224, 218),
+            rgb(92, 104, 84),
+        ];
         Self {
             metal: draft.material(Material::Plain { colour: metal, gloss: 0.1 }),
             wood: draft.material(Material::Boards { colour: rgb(140, 98, 62), width: 0.12 }),
-            bulb: draft.material(Material::Lamp { colour: Vec3::new(6.0, 4.6, 2.8), by_day: false }),
+            bulb: draft
+                .material(Material::Lamp { colour: Vec3::new(6.0, 4.6, 2.8), by_day: false }),
             tyre: draft.material(Material::Plain { colour: rgb(36, 36, 38), gloss: 0.02 }),
             glass: draft.material(Material::Plain { colour: rgb(40, 46, 52), gloss: 0.5 }),
             skin: draft.material(Material::Plain { colour: rgb(205, 160, 130), gloss: 0.0 }),
@@ -50,14 +58,24 @@ impl StreetKit {
     /// A street lamp whose head hangs `reach` metres from its foot.
     pub(crate) fn lamp(&self, draft: &mut Draft, foot: Vec3, reach: Vec2, seed: Seed) {
         let height = 6.4;
-        draft.add(Geometry::Pillar { base: foot, height, bottom: 0.1, top: 0.06 }, self.metal, seed.bits());
+        draft.add(
+            Geometry::Pillar { base: foot, height, bottom: 0.1, top: 0.06 },
+            self.metal,
+            seed.bits(),
+        );
         let head = foot + Vec3::new(reach.x, reach.y, height);
         let middle = foot + Vec3::new(0.5 * reach.x, 0.5 * reach.y, height);
         let size = Vec3::new(reach.x.abs() + 0.08, reach.y.abs() + 0.08, 0.08);
         draft.add(Geometry::block(middle, size, 0.0), self.metal, seed.bits());
         draft.add(Geometry::block(head, Vec3::new(0.5, 0.35, 0.14), 0.0), self.bulb, seed.bits());
-        let colour = Vec3::new(1.0, 0.74, 0.42).lerp(Vec3::new(0.9, 0.95, 1.0), seed.at(3).unit() * 0.5);
-        draft.lamps.push(Lamp { position: head - Vec3::Z * 0.25, colour: colour * 9.0, reach: 22.0, by_day: false });
+        let colour =
+            Vec3::new(1.0, 0.74, 0.42).lerp(Vec3::new(0.9, 0.95, 1.0), seed.at(3).unit() * 0.5);
+        draft.lamps.push(Lamp {
+            position: head - Vec3::Z * 0.25,
+            colour: colour * 9.0,
+            reach: 22.0,
+            by_day: false,
+        });
     }
 
     /// A panel with words on a pole, its face turned by `angle` from +x.
@@ -66,23 +84,55 @@ impl StreetKit {
         draft.add(Geometry::Pillar { base: foot, height, bottom: 0.04, top: 0.04 }, self.metal, 0);
         let size = Vec3::new(0.06, seed.at(1).range(0.5, 1.3), seed.at(2).range(0.3, 0.8));
         let center = foot + Vec3::Z * (height - 0.4);
-        draft.add(Geometry::block(center, size, angle), self.signs[seed.at(3).index(4)], seed.bits());
+        draft.add(
+            Geometry::block(center, size, angle),
+            self.signs[seed.at(3).index(4)],
+            seed.bits(),
+        );
     }
 
     /// A bench along y, or a bin, or a bollard.
     pub(crate) fn small_thing(&self, draft: &mut Draft, foot: Vec3, seed: Seed) {
         match seed.at(0).index(3) {
             0 => {
-                draft.add(Geometry::block(foot + Vec3::Z * 0.45, Vec3::new(0.45, 1.7, 0.06), 0.0), self.wood, seed.bits());
-                draft.add(Geometry::block(foot + Vec3::new(0.2, 0.0, 0.75), Vec3::new(0.05, 1.7, 0.4), 0.0), self.wood, seed.bits());
+                draft.add(
+                    Geometry::block(foot + Vec3::Z * 0.45, Vec3::new(0.45, 1.7, 0.06), 0.0),
+                    self.wood,
+                    seed.bits(),
+                );
+                draft.add(
+                    Geometry::block(
+                        foot + Vec3::new(0.2, 0.0, 0.75),
+                        Vec3::new(0.05, 1.7, 0.4),
+                        0.0,
+                    ),
+                    self.wood,
+                    seed.bits(),
+                );
                 for end in [-0.7, 0.7] {
-                    draft.add(Geometry::block(foot + Vec3::new(0.0, end, 0.22), Vec3::new(0.4, 0.06, 0.44), 0.0), self.metal, 0);
+                    draft.add(
+                        Geometry::block(
+                            foot + Vec3::new(0.0, end, 0.22),
+                            Vec3::new(0.4, 0.06, 0.44),
+                            0.0,
+                        ),
+                        self.metal,
+                        0,
+                    );
                 }
             }
-            1 => draft.add(Geometry::Pillar { base: foot, height: 0.95, bottom: 0.22, top: 0.3 }, self.signs[seed.at(1).index(4)], seed.bits()),
+            1 => draft.add(
+                Geometry::Pillar { base: foot, height: 0.95, bottom: 0.22, top: 0.3 },
+                self.signs[seed.at(1).index(4)],
+                seed.bits(),
+            ),
             _ => {
                 let size = Vec3::new(0.4, 0.5, 1.3);
-                draft.add(Geometry::block(foot + Vec3::Z * 0.65, size, 0.0), self.cars[seed.at(1).index(6)], seed.bits());
+                draft.add(
+                    Geometry::block(foot + Vec3::Z * 0.65, size, 0.0),
+                    self.cars[seed.at(1).index(6)],
+                    seed.bits(),
+                );
             }
         }
     }
@@ -97,17 +147,27 @@ impl StreetKit {
         let along = Vec3::new(turn.x, turn.y, 0.0);
         let across = Vec3::new(-turn.y, turn.x, 0.0);
         let size = Vec3::new(length, 1.76, body);
-        draft.add_moving(Geometry::block(foot + Vec3::Z * (0.3 + 0.5 * body), size, angle), paint, seed.bits());
+        draft.add_moving(
+            Geometry::block(foot + Vec3::Z * (0.3 + 0.5 * body), size, angle),
+            paint,
+            seed.bits(),
+        );
         if !van {
             let cabin = Vec3::new(length * 0.5, 1.56, 0.5);
             let center = foot - along * 0.25 + Vec3::Z * (0.3 + body + 0.25);
             draft.add_moving(Geometry::block(center, cabin, angle), self.glass, seed.bits());
             let roof = Vec3::new(length * 0.46, 1.5, 0.08);
-            draft.add_moving(Geometry::block(center + Vec3::Z * 0.27, roof, angle), paint, seed.bits());
+            draft.add_moving(
+                Geometry::block(center + Vec3::Z * 0.27, roof, angle),
+                paint,
+                seed.bits(),
+            );
         }
         for (end, side) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
-            let wheel = foot + along * (end * 0.31 * length) + across * (side * 0.8) + Vec3::Z * 0.32;
-            let radii = Vec3::new(0.14, 0.14, 0.32) + Vec3::new(along.x.abs(), along.y.abs(), 0.0) * 0.18;
+            let wheel =
+                foot + along * (end * 0.31 * length) + across * (side * 0.8) + Vec3::Z * 0.32;
+            let radii =
+                Vec3::new(0.14, 0.14, 0.32) + Vec3::new(along.x.abs(), along.y.abs(), 0.0) * 0.18;
             draft.add_moving(Geometry::ball(wheel, radii), self.tyre, 0);
         }
     }
@@ -133,9 +193,18 @@ impl StreetKit {
             let base = foot + (across * side + step).extend(0.0);
             add(Geometry::Pillar { base, height: 0.86 * tall, bottom: 0.08, top: 0.12 }, trousers);
         }
-        add(Geometry::ball(foot + Vec3::Z * (1.12 * tall), Vec3::new(0.24, 0.22, 0.38 * tall)), coat);
+        add(
+            Geometry::ball(foot + Vec3::Z * (1.12 * tall), Vec3::new(0.24, 0.22, 0.38 * tall)),
+            coat,
+        );
         for side in [-0.27, 0.27] {
-            add(Geometry::ball(foot + (across * side).extend(1.08 * tall), Vec3::new(0.08, 0.08, 0.34 * tall)), coat);
+            add(
+                Geometry::ball(
+                    foot + (across * side).extend(1.08 * tall),
+                    Vec3::new(0.08, 0.08, 0.34 * tall),
+                ),
+                coat,
+            );
         }
         add(Geometry::ball(foot + Vec3::Z * (1.62 * tall), Vec3::new(0.1, 0.11, 0.14)), self.skin);
     }
