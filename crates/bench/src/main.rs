@@ -1,2 +1,40 @@
-//! Placeholder of the first commit.
-fn main() {}
+//! `bench`: VPR-Bench on the command line.
+
+mod command;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use vpr_core::cli;
+
+/// VPR-Bench, chapter 3: techniques, datasets, metrics, invariance and cost of place recognition.
+#[derive(Parser)]
+#[command(version, about, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run an experiment file and compare it with the numbers of the thesis
+    Run(command::run::RunArgs),
+    /// Say how many queries find a correct reference, from two folders or two descriptor files
+    Evaluate(Box<command::evaluate::EvaluateArgs>),
+    /// List what there is
+    List(command::list::ListArgs),
+    /// Make, convert, check and search reference maps on disk
+    Map(command::map::MapArgs),
+    /// Say everything that is wrong with a dataset folder
+    Validate(command::validate::ValidateArgs),
+}
+
+fn main() -> ExitCode {
+    cli::main(|| match Cli::parse().command {
+        Command::Run(args) => command::run::run(&args),
+        Command::Evaluate(args) => command::evaluate::run(&args),
+        Command::List(args) => command::list::run(&args),
+        Command::Map(args) => command::map::run(&args),
+        Command::Validate(args) => command::validate::run(&args),
+    })
+}

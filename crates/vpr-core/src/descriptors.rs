@@ -60,6 +60,16 @@ impl Descriptors {
         self.0.view()
     }
 
+    /// All descriptors, row after row: `n_images * dim` values.
+    ///
+    /// # Panics
+    ///
+    /// Never: the rows are contiguous since [`Self::new`].
+    #[must_use]
+    pub fn as_slice(&self) -> &[f32] {
+        self.0.as_slice().expect("rows are contiguous")
+    }
+
     /// The array inside.
     #[must_use]
     pub fn into_inner(self) -> Array2<f32> {

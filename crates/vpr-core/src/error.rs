@@ -107,6 +107,15 @@ impl Error {
         move |source| Self::Io { path, source }
     }
 
+    /// The same error, naming the file its input came from if it names none itself.
+    #[must_use]
+    pub fn in_file(self, path: impl Into<PathBuf>) -> Self {
+        match self {
+            Self::Io { .. } | Self::Format { .. } => self,
+            other => Self::format(path, "content", other.to_string()),
+        }
+    }
+
     /// An [`Error::Format`].
     pub fn format(
         path: impl Into<PathBuf>,

@@ -9,7 +9,7 @@ use serde::{Deserialize, de::DeserializeOwned};
 
 use crate::{
     Error, Result,
-    table::{Provenance, Rounding, Table, Value},
+    table::{Cell, Provenance, Rounding, Table, Value},
 };
 
 /// One experiment; `S` is the chapter's own description of what to compute.
@@ -161,12 +161,18 @@ impl<S> Experiment<S> {
         table
     }
 
-    /// Writes the thesis' values beside ours, wherever row and column have one.
+    /// Writes the thesis' values beside ours; where we have none, an absent cell holds it.
     pub fn fill_thesis(&self, table: &mut Table) {
         let Some(grid) = &self.thesis else { return };
         for (row, column, value) in grid.entries() {
+            let mut is_here = false;
             for cell in table.cells.iter_mut().filter(|it| it.row == row && it.column == column) {
                 cell.thesis = Some(value.clone());
+                is_here = true;
+            }
+            if !is_here {
+                let cell = Cell::absent(row, column, "nothing at hand computes it");
+                table.push(Cell { thesis: Some(value.clone()), ..cell });
             }
         }
     }

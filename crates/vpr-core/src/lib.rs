@@ -30,7 +30,8 @@ mod error;
 pub mod experiment;
 pub mod figure;
 mod ground_truth;
-mod map;
+pub mod knn;
+pub mod map;
 pub mod metrics;
 pub mod npy;
 pub mod pickle;
@@ -49,3 +50,8 @@ pub use pose::{PlanarPosition, Pose, Poses, Position};
 pub use ranking::Ranking;
 pub use retrieval::{Retrieval, retrieve};
 pub use scores::{BestMatches, Similarities};
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

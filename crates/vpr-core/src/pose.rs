@@ -44,6 +44,21 @@ impl Poses {
         self.len() == 0
     }
 
+    /// Adds the poses of more images.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::PoseKind`] if they are of another kind.
+    pub fn extend(&mut self, more: &Self) -> Result<()> {
+        match (self, more) {
+            (Self::Planar(all), Self::Planar(more)) => all.extend(more),
+            (Self::Spatial(all), Self::Spatial(more)) => all.extend(more),
+            (Self::SixDof(all), Self::SixDof(more)) => all.extend(more),
+            (all, more) => return Err(Error::PoseKind { needed: more.kind(), actual: all.kind() }),
+        }
+        Ok(())
+    }
+
     /// How the kind is called in messages.
     #[must_use]
     pub fn kind(&self) -> &'static str {
@@ -98,25 +113,34 @@ impl Poses {
     ///
     /// [`Error::NotFinite`] names the first image whose position or orientation is not.
     pub fn check_finite(&self) -> Result<()> {
-        for row in 0..self.len() {
-            let values: Vec<f64> = match self {
-                Self::Planar(positions) => positions[row].iter().copied().collect(),
-                Self::Spatial(positions) => positions[row].iter().copied().collect(),
-                Self::SixDof(poses) => {
-                    let pose = &poses[row];
-                    pose.translation
-                        .vector
-                        .iter()
-                        .chain(pose.rotation.coords.iter())
-                        .copied()
-                        .collect()
-                }
-            };
-            if let Some(column) = values.iter().position(|value| !value.is_finite()) {
-                return Err(Error::NotFinite { what: "poses", row, column, value: values[column] });
+        match (0..self.len()).find_map(|row| Some((row, self.first_not_finite(row)?))) {
+            None => Ok(()),
+            Some((row, column)) => {
+                let value = self.values(row)[column];
+                Err(Error::NotFinite { what: "poses", row, column, value })
             }
         }
-        Ok(())
+    }
+
+    /// The first number of a pose that is NaN or infinite: position, then quaternion.
+    ///
+    /// # Panics
+    ///
+    /// If `row` is not below [`Self::len`].
+    #[must_use]
+    pub fn first_not_finite(&self, row: usize) -> Option<usize> {
+        self.values(row).iter().position(|value| !value.is_finite())
+    }
+
+    fn values(&self, row: usize) -> Vec<f64> {
+        match self {
+            Self::Planar(positions) => positions[row].iter().copied().collect(),
+            Self::Spatial(positions) => positions[row].iter().copied().collect(),
+            Self::SixDof(poses) => {
+                let Pose { rotation, translation } = &poses[row];
+                translation.vector.iter().chain(rotation.coords.iter()).copied().collect()
+            }
+        }
     }
 }
 

@@ -1,9 +1,11 @@
 //! The nearest references of every query.
 
 use ndarray::{Array2, ArrayView1};
-use rayon::prelude::*;
 
-use crate::{Descriptors, Error, Ranking, Result};
+use crate::{
+    Descriptors, Error, Ranking, Result,
+    knn::{SearchParams, search},
+};
 
 /// The `k` nearest references of every query, nearest first, ties by lower index.
 ///
@@ -90,6 +92,22 @@ impl Retrieval {
         self.distances.row(query)
     }
 
+    /// The same ranks with other names: index `i` becomes `names[i]`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] if an index has no name.
+    pub fn with_indices(self, names: &[usize]) -> Result<Self> {
+        let mut renamed = Array2::zeros(self.distances.dim());
+        for (new, &index) in
+            renamed.iter_mut().zip((0..self.len()).flat_map(|query| self.ranking.indices(query)))
+        {
+            let len = names.len();
+            *new = *names.get(index).ok_or(Error::OutOfRange { what: "reference", index, len })?;
+        }
+        Self::new(renamed, self.distances)
+    }
+
     /// The reference at rank 1 of every query.
     #[must_use]
     pub fn best(&self) -> Vec<usize> {
@@ -99,61 +117,15 @@ impl Retrieval {
 
 /// Finds the `k` references nearest to every query in Euclidean distance, exactly.
 ///
-/// Gives fewer than `k` columns if there are fewer references. Squared differences are summed in
-/// f64 and in order, so the result does not depend on the number of threads.
+/// The simple door to [`knn::search`](crate::knn::search), which has the same result for any
+/// number of threads. Gives fewer than `k` columns if there are fewer references.
 ///
 /// # Errors
 ///
 /// [`Error::Mismatch`] if the two sets have different dimensions, [`Error::Empty`] if there is no
-/// reference or `k` is zero.
+/// reference or `k` is zero, [`Error::NotFinite`] if a distance is too large for f32.
 pub fn retrieve(queries: &Descriptors, references: &Descriptors, k: usize) -> Result<Retrieval> {
-    if queries.dim() != references.dim() {
-        return Err(Error::Mismatch {
-            what: "dimension of the query descriptors",
-            expected: references.dim(),
-            actual: queries.dim(),
-        });
-    }
-    let k = k.min(references.len());
-    if k == 0 {
-        return Err(Error::Empty("references to retrieve"));
-    }
-    let ranked: Vec<Vec<(f64, usize)>> = (0..queries.len())
-        .into_par_iter()
-        .map(|query| nearest(queries.row(query), references, k))
-        .collect();
-    let shape = (queries.len(), k);
-    Retrieval::new(
-        Array2::from_shape_fn(shape, |(query, rank)| ranked[query][rank].1),
-        Array2::from_shape_fn(shape, |(query, rank)| euclidean(ranked[query][rank].0)),
-    )
-}
-
-/// The `k` references nearest to one query: squared distance and index, ascending.
-fn nearest(query: ArrayView1<'_, f32>, references: &Descriptors, k: usize) -> Vec<(f64, usize)> {
-    let mut ranked: Vec<(f64, usize)> = references
-        .view()
-        .outer_iter()
-        .map(|reference| squared_distance(query, reference))
-        .zip(0..)
-        .collect();
-    let by_distance_then_index =
-        |a: &(f64, usize), b: &(f64, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
-    if k < ranked.len() {
-        ranked.select_nth_unstable_by(k, by_distance_then_index);
-        ranked.truncate(k);
-    }
-    ranked.sort_unstable_by(by_distance_then_index);
-    ranked
-}
-
-fn squared_distance(a: ArrayView1<'_, f32>, b: ArrayView1<'_, f32>) -> f64 {
-    a.iter().zip(b).map(|(&a, &b)| (f64::from(a) - f64::from(b)).powi(2)).sum()
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "distances are f32")]
-fn euclidean(squared: f64) -> f32 {
-    squared.sqrt() as f32
+    search(references, queries, &SearchParams { k, ..SearchParams::default() })
 }
 
 #[cfg(test)]

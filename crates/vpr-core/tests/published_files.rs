@@ -1,5 +1,7 @@
 //! The readers against what NumPy reads in the files VPR-Bench published (`VPR_DATA`).
 
+#![expect(clippy::unwrap_used, clippy::print_stderr, reason = "a test may")]
+
 use std::path::{Path, PathBuf};
 
 use vpr_core::dataset::layout::vpr_bench::{

@@ -4,13 +4,16 @@
 //! the gray value and resizing are the ones OpenCV's `imread`, `cvtColor` and `resize` define, because the
 //! descriptors of the field were published through them.
 
+mod resize;
+
 use std::{fs, io::Cursor, path::Path};
 
 use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
+use kornia_image::Image;
 pub use kornia_image::ImageSize;
-use kornia_image::{Image, InterpolationMode};
-use kornia_imgproc::resize::resize_opencv_u8;
 use vpr_core::{Error, Result};
+
+pub use self::resize::resize_bilinear;
 
 /// A colour image: height × width × 3 bytes, red first.
 pub type RgbImage = Image<u8, 3>;
@@ -76,36 +79,11 @@ pub fn probe(path: &Path) -> Result<ImageSize> {
     Ok(ImageSize { width: width as usize, height: height as usize })
 }
 
-/// Luma by ITU-R BT.601 in OpenCV's 14-bit fixed point: `(4899 R + 9617 G + 1868 B + 8192) >> 14`.
+/// Luma by ITU-R BT.601 in OpenCV's 15-bit fixed point: `(9798 R + 19235 G + 3735 B + 16384) >> 15`.
 #[must_use]
 pub fn gray(image: &RgbImage) -> GrayImage {
     let (pixels, _) = image.as_slice().as_chunks();
     from_pixels(image.size(), pixels.iter().copied().map(luma).collect())
-}
-
-/// Bilinear resize without anti-aliasing, byte for byte OpenCV's `resize` with `INTER_LINEAR`.
-///
-/// # Errors
-///
-/// [`Error::Parameter`] if either image has no pixels.
-pub fn resize_bilinear<const C: usize>(
-    image: &Image<u8, C>,
-    size: ImageSize,
-) -> Result<Image<u8, C>> {
-    let refuse = |size: ImageSize| Error::Parameter {
-        name: "size",
-        value: format!("{}x{}", size.width, size.height),
-        reason: "an image needs at least one pixel and at most 2^26",
-    };
-    for size in [image.size(), size] {
-        let pixels = size.width.checked_mul(size.height).ok_or_else(|| refuse(size))?;
-        if !(1..=MAX_PIXELS).contains(&pixels) {
-            return Err(refuse(size));
-        }
-    }
-    let mut resized = Image::from_size_val(size, 0).map_err(|_| refuse(size))?;
-    resize_opencv_u8(image, &mut resized, InterpolationMode::Bilinear).map_err(|_| refuse(size))?;
-    Ok(resized)
 }
 
 fn from_pixels<const C: usize>(size: ImageSize, pixels: Vec<u8>) -> Image<u8, C> {
@@ -114,7 +92,7 @@ fn from_pixels<const C: usize>(size: ImageSize, pixels: Vec<u8>) -> Image<u8, C>
 
 fn luma(pixel: [u8; 3]) -> u8 {
     let [r, g, b] = pixel.map(u32::from);
-    u8::try_from((4899 * r + 9617 * g + 1868 * b + 8192) >> 14).expect("the weights sum to one")
+    u8::try_from((9798 * r + 19_235 * g + 3735 * b + 16_384) >> 15).expect("the weights sum to one")
 }
 
 fn read(path: &Path) -> Result<Vec<u8>> {
@@ -159,4 +137,135 @@ fn is_complete_jpeg(bytes: &[u8]) -> bool {
 fn turns_sideways(orientation: image::metadata::Orientation) -> bool {
     use image::metadata::Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
     matches!(orientation, Rotate90 | Rotate90FlipH | Rotate270 | Rotate270FlipH)
+}
+
+#[cfg(test)]
+mod tests {
+    use image::ImageFormat;
+
+    use super::*;
+
+    /// Pseudo-random bytes, the same ones that OpenCV was given.
+    pub(super) fn noise(width: usize, height: usize) -> RgbImage {
+        let byte = |at: usize| u8::try_from(((at * 2_654_435_761) >> 7) % 256).unwrap();
+        from_pixels(ImageSize { width, height }, (0..width * height * 3).map(byte).collect())
+    }
+
+    /// A smooth image, encoded.
+    fn encoded(format: ImageFormat) -> Vec<u8> {
+        let image = image::RgbImage::from_fn(48, 32, |x, y| {
+            image::Rgb([x * 5, y * 7, x + y].map(|it| u8::try_from(it).unwrap()))
+        });
+        let mut file = Cursor::new(Vec::new());
+        image.write_to(&mut file, format).unwrap();
+        file.into_inner()
+    }
+
+    fn decode_here(bytes: &[u8]) -> Result<RgbImage> {
+        decode_bytes(bytes, Path::new("street.jpg"))
+    }
+
+    /// FNV-1a, so that OpenCV's answer fits in a line.
+    pub(super) fn digest(bytes: &[u8]) -> u64 {
+        bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+        })
+    }
+
+    #[test]
+    fn png_is_decoded_exactly_red_first() {
+        let image = decode_here(&encoded(ImageFormat::Png)).unwrap();
+        assert_eq!(image.size(), ImageSize { width: 48, height: 32 });
+        assert_eq!(&image.as_slice()[(3 * 48 + 2) * 3..][..3], [10, 21, 5]);
+    }
+
+    #[test]
+    fn jpeg_is_decoded_closely() {
+        let [png, jpeg] = [ImageFormat::Png, ImageFormat::Jpeg].map(encoded);
+        let [exact, close] = [png, jpeg].map(|it| decode_here(&it).unwrap());
+        let off =
+            exact.as_slice().iter().zip(close.as_slice()).map(|(a, b)| f64::from(a.abs_diff(*b)));
+        let mean = off.sum::<f64>() / exact.as_slice().len() as f64;
+        assert!(mean < 3.0, "{mean}");
+    }
+
+    #[test]
+    fn truncated_files_are_refused_at_every_length() {
+        for format in [ImageFormat::Jpeg, ImageFormat::Png] {
+            let bytes = encoded(format);
+            // of a PNG, only the checksum of the empty last chunk may be missing
+            for length in 0..bytes.len() - 12 {
+                let error = decode_here(&bytes[..length]).err();
+                let error =
+                    error.unwrap_or_else(|| panic!("{format:?} of {length} bytes")).to_string();
+                assert!(error.starts_with("street.jpg: "), "{error}");
+            }
+        }
+    }
+
+    #[test]
+    fn flipped_bits_never_panic() {
+        for format in [ImageFormat::Jpeg, ImageFormat::Png] {
+            let bytes = encoded(format);
+            for bit in 0..8 * bytes.len() {
+                let mut damaged = bytes.clone();
+                damaged[bit / 8] ^= 1 << (bit % 8);
+                match decode_here(&damaged) {
+                    Ok(image) => assert!(image.width() * image.height() <= MAX_PIXELS),
+                    Err(error) => assert!(error.to_string().starts_with("street.jpg: "), "{error}"),
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn headers_that_claim_too_much_are_refused() {
+        let mut bytes = encoded(ImageFormat::Jpeg);
+        let frame = bytes.windows(2).position(|it| it == [0xFF, 0xC0]).unwrap();
+        bytes[frame + 5..frame + 9].fill(0xFF); // 65535 × 65535
+        let error = decode_here(&bytes).err().unwrap().to_string();
+        assert!(error.starts_with("street.jpg: header: 65535x65535 pixels"), "{error}");
+    }
+
+    #[test]
+    fn other_files_are_refused() {
+        for bytes in [&b""[..], b"GIF89a", b"\x89PNG", b"\xFF\xD8\xFF\xD9"] {
+            assert!(decode_here(bytes).is_err());
+        }
+        let missing = decode(Path::new("no/such.jpg")).err().unwrap();
+        assert!(matches!(missing, Error::Io { .. }), "{missing}");
+    }
+
+    #[test]
+    fn probe_agrees_with_decode() -> std::io::Result<()> {
+        let folder = tempfile::tempdir()?;
+        for format in [ImageFormat::Jpeg, ImageFormat::Png] {
+            let path = folder.path().join("image");
+            fs::write(&path, encoded(format))?;
+            assert_eq!(probe(&path).unwrap(), decode(&path).unwrap().size());
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn orientation_of_the_camera_is_applied() -> std::io::Result<()> {
+        // an EXIF segment with one entry, orientation 6: turn clockwise by a quarter
+        let exif = b"\xFF\xE1\x00\x22Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0";
+        let upright = encoded(ImageFormat::Jpeg);
+        let turned = [&upright[..2], exif, &upright[2..]].concat();
+        let [upright, turned_image] = [&upright, &turned].map(|it| decode_here(it).unwrap());
+        let size = ImageSize { width: 32, height: 48 };
+        assert_eq!(turned_image.size(), size);
+        assert_eq!(turned_image.as_slice()[31 * 3..][..3], upright.as_slice()[..3]);
+        let file = tempfile::NamedTempFile::new()?;
+        fs::write(file.path(), turned)?;
+        assert_eq!(probe(file.path()).unwrap(), size);
+        Ok(())
+    }
+
+    /// Digest of `cv2.cvtColor(noise, cv2.COLOR_RGB2GRAY)`, OpenCV 4.14.0.
+    #[test]
+    fn gray_is_that_of_opencv() {
+        assert_eq!(digest(gray(&noise(53, 37)).as_slice()), 0xbb52_8b66_683d_90f1);
+    }
 }

@@ -12,7 +12,7 @@ use super::{Context, subject::hand_crafted};
 use crate::technique::Technique;
 
 /// The descriptor of a technique that does not run here, as the thesis states it.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DescriptorShape {
     /// The technique.
@@ -43,6 +43,7 @@ pub(super) fn run(
 
 /// Times measured here, each apart from the other; only on request, since they vary.
 fn times(table: &mut Table, timed_on: &str, context: Context<'_>) -> Result<()> {
+    networks(table);
     for (column, technique) in hand_crafted() {
         let images = context.data.images(timed_on)?.filter(|_| context.timings);
         let Some(images) = images else {
@@ -60,18 +61,19 @@ fn times(table: &mut Table, timed_on: &str, context: Context<'_>) -> Result<()> 
             table.push(cell.noted(&note).timing());
         }
     }
+    Ok(())
+}
+
+/// The techniques that cannot be timed.
+fn networks(table: &mut Table) {
     for technique in Technique::ALL {
         if !matches!(technique, Technique::Hog | Technique::CoHog) {
             for row in [ENCODING, MATCHING] {
-                table.push(Cell::absent(
-                    row,
-                    technique.name(),
-                    "its network does not run here yet",
-                ));
+                let why = "its network does not run here yet";
+                table.push(Cell::absent(row, technique.name(), why));
             }
         }
     }
-    Ok(())
 }
 
 const ENCODING: &str = "t_e (s)";
@@ -97,9 +99,12 @@ fn stored_times(table: &mut Table, datasets: &[String], context: Context<'_>) ->
             let n = stored.similarities.n_queries();
             for (row, value) in rows.into_iter().zip(values) {
                 let cell = Cell::new(row, technique.name(), value, Provenance::Published, n);
-                table.push(
-                    cell.noted("as the authors measured it; matching includes printing (VB-14)"),
-                );
+                table.push(cell.noted(match technique {
+                    Technique::ApGem | Technique::DenseVlad => {
+                        "the same round number is stored with every dataset: a placeholder, it seems"
+                    }
+                    _ => "as the authors measured it; matching includes printing (VB-14)",
+                }));
             }
         }
     }

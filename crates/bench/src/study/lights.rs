@@ -10,7 +10,7 @@ use vpr_core::{
 ///
 /// The thesis' caption calls the first column θ and says θ is the elevation; elevations of 264°
 /// do not exist, so the first is the azimuth.
-pub const LIGHTS: [(f64, f64); 19] = [
+pub(super) const LIGHTS: [(f64, f64); 19] = [
     (264.0, 57.0),
     (277.0, 57.0),
     (227.0, 68.0),

@@ -85,12 +85,7 @@ pub(super) fn stored(id: &str, context: Context<'_>) -> Result<Vec<Subject>> {
     let mut subjects = Vec::new();
     for technique in Technique::ALL {
         let Some(stored) = context.data.stored(id, technique)? else { continue };
-        let note = match stored.n_clamped {
-            0 => None,
-            n => Some(format!(
-                "{n} entries of the ground truth point past the references and are dropped"
-            )),
-        };
+        let note = clamped(stored.n_clamped);
         subjects.push(Subject {
             row: context.data.entry(id)?.name.clone(),
             column: technique.name(),
@@ -104,12 +99,21 @@ pub(super) fn stored(id: &str, context: Context<'_>) -> Result<Vec<Subject>> {
     Ok(subjects)
 }
 
+/// What to say of a ground truth that points past the references (VB-15).
+fn clamped(n: usize) -> Option<String> {
+    (n > 0).then(|| {
+        format!("{n} entries of the ground truth point past the references and are dropped")
+    })
+}
+
 /// HOG and `CoHOG`, computed here, if the images are at hand.
 pub(super) fn measured(id: &str, context: Context<'_>) -> Result<Vec<Subject>> {
     let Some(dataset) = context.data.images(id)? else { return Ok(Vec::new()) };
     let provenance = context.data.provenance(id)?;
+    let remark = context.data.entry(id)?.note.clone();
     let subject = |(column, technique): (&'static str, HandCrafted)| {
         let (similarities, note) = match_images(&technique, column, &dataset, false, context)?;
+        let note = clamped(dataset.n_clamped).or(note).or_else(|| remark.clone());
         Ok(Subject {
             row: dataset.name.clone(),
             column,

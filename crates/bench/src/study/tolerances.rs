@@ -2,7 +2,7 @@
 
 use vpr_core::{
     Result,
-    dataset::layout::vpr_bench::GroundTruthFile,
+    dataset::{Tolerance, layout::vpr_bench::GroundTruthFile},
     figure::Figure,
     table::{Cell, Provenance, Table},
 };
@@ -26,8 +26,14 @@ pub(super) fn run(
         let n = file.len();
         let provenance =
             if id == "fixture" { Provenance::Generated } else { Provenance::Published };
-        let text = describe(&file);
-        table.push(Cell::new(&row, COLUMN, text.as_str(), provenance, n));
+        if let Tolerance::Metres(_) = context.data.entry(id)?.tolerance {
+            let why = "metres cannot be checked: the published lists come without positions";
+            table.push(Cell::absent(&row, COLUMN, why));
+        } else {
+            let (text, remark) = describe(&file);
+            let cell = Cell::new(&row, COLUMN, text.as_str(), provenance, n);
+            table.push(if remark.is_empty() { cell } else { cell.noted(remark) });
+        }
         let lists = file.lists.iter().filter(|list| list.as_slice() != [-1]);
         let counts: Vec<usize> = lists.map(Vec::len).collect();
         let most = counts.iter().copied().max().unwrap_or(0) as f64;
@@ -38,8 +44,8 @@ pub(super) fn run(
     Ok(None)
 }
 
-/// What the lists of a ground truth amount to, in the thesis' words where they fit.
-fn describe(file: &GroundTruthFile) -> String {
+/// What the lists of a ground truth amount to, in the thesis' words where they fit, and a remark.
+fn describe(file: &GroundTruthFile) -> (String, &'static str) {
     let lists: Vec<(i64, &[i64])> = (0..)
         .zip(&file.lists)
         .map(|(query, list)| (query, list.as_slice()))
@@ -54,41 +60,44 @@ fn describe(file: &GroundTruthFile) -> String {
         let is_range = lists.iter().all(|(query, list)| {
             let centre = query * stride;
             let low = (centre - tolerance).max(0);
-            list.iter().copied().eq(low..low + list.len() as i64)
-                && (list.len() as i64 >= centre - low + 1)
+            // Lists may end early where the references do, but not before the centre.
+            list.iter().copied().eq((low..).take(list.len())) && list.contains(&centre)
         });
         is_range.then_some(tolerance)
     };
     if lists.iter().all(|(_, list)| list.len() == 1) {
-        return "Frame-to-frame".to_owned();
+        return ("Frame-to-frame".to_owned(), "");
     }
     if let Some(tolerance) = spans(1) {
-        return format!("± {tolerance} frames");
+        return (format!("± {tolerance} frames"), "");
     }
     if let Some(tolerance) = spans(10) {
-        return format!("± {tolerance} frames, reference 10 q");
+        return (format!("± {tolerance} frames"), "around reference 10 q of query q");
     }
     let first = lists[0].1.len();
     if lists.iter().all(|(_, list)| list.len() == first) {
-        return format!("{first} frames");
+        return (format!("{first} frames"), "");
     }
-    "lists, not a range of frames".to_owned()
+    let most = lists.iter().map(|(_, list)| list.len()).max().unwrap_or(0);
+    (format!("lists of up to {most} references"), "")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn describe_lists(lists: Vec<Vec<i64>>) -> String {
+    fn describe_lists(lists: Vec<Vec<i64>>) -> (String, &'static str) {
         describe(&GroundTruthFile { path: "test".into(), lists })
     }
 
     #[test]
     fn ranges_of_frames_are_recognized() {
-        assert_eq!(describe_lists(vec![vec![0], vec![1], vec![-1]]), "Frame-to-frame");
-        assert_eq!(describe_lists(vec![vec![0, 1], vec![0, 1, 2], vec![1, 2]]), "± 1 frames");
-        assert_eq!(describe_lists(vec![vec![0, 1], vec![9, 10, 11]]), "± 1 frames, reference 10 q");
-        assert_eq!(describe_lists(vec![vec![0, 7], vec![3, 9]]), "2 frames");
-        assert_eq!(describe_lists(vec![vec![0, 7], vec![3]]), "lists, not a range of frames");
+        let text = |lists| describe_lists(lists).0;
+        assert_eq!(text(vec![vec![0], vec![1], vec![-1]]), "Frame-to-frame");
+        assert_eq!(text(vec![vec![0, 1], vec![0, 1, 2], vec![1, 2]]), "± 1 frames");
+        let every_tenth = describe_lists(vec![vec![0, 1], vec![9, 10, 11]]);
+        assert_eq!(every_tenth, ("± 1 frames".into(), "around reference 10 q of query q"));
+        assert_eq!(text(vec![vec![0, 7], vec![3, 9]]), "2 frames");
+        assert_eq!(text(vec![vec![0, 7], vec![3]]), "lists of up to 2 references");
     }
 }

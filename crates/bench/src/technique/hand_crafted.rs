@@ -54,10 +54,8 @@ impl HandCrafted {
             Self::Hog(params) => {
                 let hog = Hog::new(*params)?;
                 let rows = each(images, step, |path| hog.describe(&image::decode(path)?))?;
-                let dim = params.dim();
-                let flat: Vec<f32> = rows.into_iter().flatten().collect();
-                let rows = Array2::from_shape_vec((images.len(), dim), flat)
-                    .expect("every descriptor has the dimension of its parameters");
+                let shape = (images.len(), params.dim());
+                let rows = Array2::from_shape_fn(shape, |(row, column)| rows[row][column]);
                 Descriptors::new(rows).map(Features::Hog)
             }
             Self::CoHog(params) => {
@@ -110,6 +108,15 @@ impl Features {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// The vectors, if the technique has one per image.
+    #[must_use]
+    pub fn into_descriptors(self) -> Option<Descriptors> {
+        match self {
+            Self::Hog(descriptors) => Some(descriptors),
+            Self::CoHog(_) => None,
+        }
     }
 
     /// Compares every query with every reference of the same technique.

@@ -247,9 +247,9 @@ impl Report<'_> {
                 Ok(_) => {}
             }
         }
-        if let Some(pair) = list.windows(2).find(|pair| pair[0] >= pair[1]) {
-            let reason =
-                format!("not ascending without repetition: {} before {}", pair[0], pair[1]);
+        if let Some(at) = (1..list.len()).find(|&at| list[at - 1] >= list[at]) {
+            let (before, after) = (list[at - 1], list[at]);
+            let reason = format!("not ascending without repetition: {before} before {after}");
             self.warning(path, place, reason);
         }
     }

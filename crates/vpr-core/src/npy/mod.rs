@@ -20,7 +20,7 @@ use crate::{
     Error, Result,
     pickle::{self, Elements, Value},
 };
-use header::Header;
+pub(crate) use header::Header;
 
 /// Reads an array of numbers.
 ///

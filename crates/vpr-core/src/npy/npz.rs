@@ -38,7 +38,8 @@ pub fn read<T: Element, D: Dimension>(path: &Path, name: &str) -> Result<Array<T
     let entry = match archive.by_name(&format!("{name}.npy")) {
         Ok(entry) => entry,
         Err(ZipError::FileNotFound) => {
-            return Err(err(format!("is not there; known: {}", names(path)?.join(", "))));
+            let known = names(path)?.join(", ");
+            return Err(err(format!("is not there; known: {}", known.escape_debug())));
         }
         Err(cause) => return Err(err(cause.to_string())),
     };

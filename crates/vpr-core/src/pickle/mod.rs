@@ -3,9 +3,11 @@
 //! Published datasets come as pickles inside `.npy` files and as `.pkl` dictionaries. This reader
 //! knows the opcodes and the few NumPy constructors that those need (protocols 0 to 5, NumPy 1 and
 //! 2, Python 2 and 3); everything else is an error that names the opcode and its byte offset.
-//! It has no recursion during decoding, and what it allocates is linear in the length of the input:
-//! an object that a pickle shares is copied, but all copies together may hold at most
-//! [`MAX_EXPANSION`] times as many bytes and objects as the pickle itself has bytes.
+//! Decoding does not recurse, and what it allocates is linear in the length of the input: at worst
+//! some hundred bytes per byte (144 measured, for nothing but empty lists), one for a stored score
+//! matrix. An object that a pickle shares is copied, but all values together may hold at most
+//! [`MAX_EXPANSION`] times as many bytes and objects as the pickle has bytes, nested at most
+//! [`MAX_DEPTH`] levels deep.
 //!
 //! ```
 //! use vpr_core::pickle::{Value, decode};

@@ -52,8 +52,9 @@ impl HogParams {
 
     pub(super) fn check(&self) -> Result<()> {
         let &Self { window, block, stride, cell, bins } = self;
-        let refuse =
-            |name, value: usize, reason| Err(Error::Parameter { name, value: value.to_string(), reason });
+        let refuse = |name, value: usize, reason| {
+            Err(Error::Parameter { name, value: value.to_string(), reason })
+        };
         if !(2..=4096).contains(&window) {
             refuse("window", window, "must be from 2 to 4096")
         } else if block == 0 || block > window {

@@ -96,13 +96,11 @@ fn listed(folder: &Path, list: &Path) -> Result<Vec<PathBuf>> {
         let line = line.trim();
         let parent = folder.parent().unwrap_or(Path::new(""));
         let candidates = [PathBuf::from(line), folder.join(line), parent.join(line)];
-        match candidates.into_iter().find(|path| path.is_file()) {
-            Some(path) => images.push(path),
-            None => {
-                let reason = format!("`{line}` does not exist");
-                return Err(Error::format(list, format!("line {}", index + 1), reason));
-            }
-        }
+        let image = candidates.into_iter().find(|path| path.is_file()).ok_or_else(|| {
+            let reason = format!("`{line}` does not exist");
+            Error::format(list, format!("line {}", index + 1), reason)
+        })?;
+        images.push(image);
     }
     images.sort();
     Ok(images)

@@ -43,7 +43,7 @@ impl PublishedMatches {
         let reference = indices(path, "retrieved references (part 1)", reference)?;
         let score = numbers(path, "best scores (part 2)", score)?;
         let similarities = matrix(path, scores)?;
-        let matches = Self {
+        let published = Self {
             query,
             reference,
             score,
@@ -51,8 +51,8 @@ impl PublishedMatches {
             encode_s: seconds(path, "encoding time (part 4)", encode_s)?,
             match_s: seconds(path, "matching time (part 5)", match_s)?,
         };
-        matches.check(path)?;
-        Ok(matches)
+        published.check(path)?;
+        Ok(published)
     }
 
     /// Counts, ranges and finite values.

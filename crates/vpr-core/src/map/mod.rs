@@ -1,4 +1,38 @@
-//! The reference map: descriptors with poses.
+//! The reference map: descriptors with poses, in memory and on disk.
+
+mod about;
+mod access;
+mod checks;
+mod companions;
+mod copy;
+mod digest;
+pub mod door;
+mod file;
+mod header;
+mod layout;
+mod names;
+mod open_map;
+mod replace;
+mod row_type;
+mod segments;
+mod touch;
+mod utm;
+mod verify;
+mod writer;
+
+pub use about::{About, Coordinates, ImageSize, UtmZone, metric_name, parse_metric};
+pub use copy::{copy_as, merge};
+pub use digest::{BlockDigest, image_list_digest};
+pub use file::{Access, MapFile, Opening};
+pub use header::{ElementType, Header, TensorEntry};
+pub use names::Names;
+pub use open_map::OpenMap;
+pub use replace::{NewFile, replace};
+pub use row_type::RowType;
+pub use segments::GrowingMap;
+pub use utm::LatLon;
+pub use verify::verify;
+pub use writer::{MapWriter, write};
 
 use crate::{Descriptors, Error, Poses, Result};
 

@@ -1,0 +1,264 @@
+//! `bench evaluate`: from two folders or two descriptor files to `R@1: 98.8, R@5: 99.7, …`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail, ensure};
+use bench::{study::Observer, technique::HandCrafted};
+use clap::ValueEnum;
+use vpr_core::{
+    Descriptors, GroundTruth, Poses, Ranking,
+    cli::{self, Outcome},
+    dataset::layout::{
+        pose_csv::PoseTable,
+        utm_names::UtmFolder,
+        vpr_bench::{GroundTruthFile, image_folder},
+    },
+    metrics::recall_at,
+    npy, retrieve,
+};
+use vpr_vision::{cohog::CoHogParams, hog::HogParams};
+
+use super::{
+    predictions::{self, Named},
+    run::Bar,
+};
+
+/// The flags of VPR-methods-evaluation, in kebab case; the names with underscores work too.
+#[derive(clap::Args)]
+pub(crate) struct EvaluateArgs {
+    /// Folder of the reference images, with `@utm_east@utm_north@…` names
+    #[arg(long, alias = "database_folder", value_name = "DIR", requires = "queries_folder")]
+    pub(super) database_folder: Option<PathBuf>,
+    /// Folder of the query images
+    #[arg(long, alias = "queries_folder", value_name = "DIR", requires = "database_folder")]
+    pub(super) queries_folder: Option<PathBuf>,
+    /// Technique that describes the images
+    #[arg(long, value_enum, default_value_t = Method::Hog)]
+    method: Method,
+    /// Descriptors of the references, one row each: .npy, float32
+    #[arg(
+        long,
+        alias = "database_descriptors",
+        value_name = "NPY",
+        requires = "queries_descriptors",
+        conflicts_with = "database_folder"
+    )]
+    database_descriptors: Option<PathBuf>,
+    /// Descriptors of the queries
+    #[arg(
+        long,
+        alias = "queries_descriptors",
+        value_name = "NPY",
+        requires = "database_descriptors"
+    )]
+    queries_descriptors: Option<PathBuf>,
+    /// Poses of the references: CSV with a header
+    #[arg(long, alias = "database_poses", value_name = "CSV", requires = "queries_poses")]
+    database_poses: Option<PathBuf>,
+    /// Poses of the queries
+    #[arg(long, alias = "queries_poses", value_name = "CSV", requires = "database_poses")]
+    queries_poses: Option<PathBuf>,
+    /// Correct references per query, VPR-Bench's `ground_truth_new.npy`; instead of positions
+    #[arg(long, alias = "ground_truth", value_name = "NPY", conflicts_with = "database_poses")]
+    ground_truth: Option<PathBuf>,
+    /// A reference is correct within this many metres, the limit included
+    #[arg(long, alias = "positive_dist_threshold", default_value_t = 25.0, value_name = "M")]
+    positive_dist_threshold: f64,
+    /// Which N of recall@N to print
+    #[arg(long, alias = "recall_values", num_args = 1.., default_values_t = [1, 5, 10, 20], value_name = "N")]
+    recall_values: Vec<usize>,
+    /// Only retrieve; positions are unknown
+    #[arg(long, alias = "no_labels")]
+    pub(super) no_labels: bool,
+    /// How many predictions to save for each query
+    #[arg(long, alias = "num_preds_to_save", default_value_t = 0, value_name = "N")]
+    pub(super) num_preds_to_save: usize,
+    /// Save only predictions of queries whose best reference is wrong
+    #[arg(long, alias = "save_only_wrong_preds", conflicts_with = "no_labels")]
+    pub(super) save_only_wrong_preds: bool,
+    /// Save the descriptors as `.npy`
+    #[arg(long, alias = "save_descriptors")]
+    pub(super) save_descriptors: bool,
+    /// Name of the folder below `logs/` where results are saved
+    #[arg(long, alias = "log_dir", default_value = "default", value_name = "NAME")]
+    pub(super) log_dir: String,
+    /// Threads; all processors by default
+    #[arg(long, alias = "num_workers", value_name = "N")]
+    num_workers: Option<usize>,
+}
+
+/// A technique that runs here.
+#[derive(Clone, Copy, ValueEnum)]
+enum Method {
+    /// HOG in VPR-Bench's released configuration, 35721 dimensions
+    Hog,
+    /// HOG in the thesis' configuration, 34596 dimensions
+    HogThesis,
+    /// CoHOG, 961 regions of 32 dimensions
+    Cohog,
+}
+
+impl Method {
+    fn technique(self) -> HandCrafted {
+        match self {
+            Self::Hog => HandCrafted::Hog(HogParams::RELEASED),
+            Self::HogThesis => HandCrafted::Hog(HogParams::THESIS),
+            Self::Cohog => HandCrafted::CoHog(CoHogParams::default()),
+        }
+    }
+}
+
+/// The two sets with what was retrieved.
+pub(super) struct Retrieved {
+    pub(super) queries: Named,
+    pub(super) references: Named,
+    pub(super) ranking: Ranking,
+    /// Query and reference vectors, for techniques that have one per image.
+    pub(super) descriptors: Option<(Descriptors, Descriptors)>,
+}
+
+pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
+    if let Some(n) = args.num_workers {
+        rayon::ThreadPoolBuilder::new().num_threads(n).build_global()?;
+    }
+    ensure!(args.recall_values.iter().all(|&n| n > 0), "`recall-values` 0: recall@0 is no metric");
+    let largest = args.recall_values.iter().copied().max().unwrap_or(1);
+    let k = largest.max(args.num_preds_to_save);
+    let retrieved = match (&args.database_folder, &args.queries_folder) {
+        (Some(references), Some(queries)) => from_folders(args, queries, references, k)?,
+        _ => from_descriptors(args, k)?,
+    };
+    let truth = if args.no_labels { None } else { Some(truth(args, &retrieved)?) };
+    if let Some(truth) = &truth {
+        let entries = args.recall_values.iter().map(|&n| {
+            let recall = recall_at(n, &retrieved.ranking, truth)?;
+            Ok(format!("R@{n}: {:.1}", 100.0 * recall))
+        });
+        let entries: Vec<String> = entries.collect::<vpr_core::Result<_>>()?;
+        cli::print(&format!("{}\n", entries.join(", ")))?;
+    }
+    predictions::save(args, &retrieved, truth.as_ref())?;
+    Ok(Outcome::Success)
+}
+
+/// Describes and matches the images of two folders.
+fn from_folders(
+    args: &EvaluateArgs,
+    queries: &Path,
+    references: &Path,
+    k: usize,
+) -> anyhow::Result<Retrieved> {
+    let needs_positions = !args.no_labels && args.ground_truth.is_none();
+    let queries = Named::folder(queries, needs_positions)?;
+    let references = Named::folder(references, needs_positions)?;
+    let technique = args.method.technique();
+    let bar = Bar::default();
+    let n = queries.names.len() + references.names.len();
+    bar.start("images", n);
+    let step = || bar.step();
+    let query_features = technique.encode(&queries.names, &step)?;
+    let reference_features = technique.encode(&references.names, &step)?;
+    bar.end();
+    let matched = query_features.match_with(&reference_features)?;
+    let ranking = matched.similarities.ranked(k)?;
+    let descriptors = query_features.into_descriptors().zip(reference_features.into_descriptors());
+    Ok(Retrieved { queries, references, ranking, descriptors })
+}
+
+/// Retrieves from two files of descriptors by Euclidean distance.
+fn from_descriptors(args: &EvaluateArgs, k: usize) -> anyhow::Result<Retrieved> {
+    let (Some(references), Some(queries)) = (&args.database_descriptors, &args.queries_descriptors)
+    else {
+        bail!(
+            "give --database-folder and --queries-folder, or --database-descriptors and --queries-descriptors"
+        );
+    };
+    let read = |path: &PathBuf| -> anyhow::Result<Descriptors> {
+        Descriptors::new(npy::read_f32(path)?).with_context(|| path.display().to_string())
+    };
+    let (query_rows, reference_rows) = (read(queries)?, read(references)?);
+    let retrieval = retrieve(&query_rows, &reference_rows, k)
+        .with_context(|| format!("{} and {}", queries.display(), references.display()))?;
+    let named = |poses: &Option<PathBuf>, rows: &Descriptors| match poses {
+        Some(path) => Named::poses(path, rows.len()),
+        None => Ok(Named::numbered(rows.len())),
+    };
+    Ok(Retrieved {
+        queries: named(&args.queries_poses, &query_rows)?,
+        references: named(&args.database_poses, &reference_rows)?,
+        ranking: AsRef::<Ranking>::as_ref(&retrieval).clone(),
+        descriptors: Some((query_rows, reference_rows)),
+    })
+}
+
+/// Which references are correct: from a file, or by distance.
+fn truth(args: &EvaluateArgs, retrieved: &Retrieved) -> anyhow::Result<GroundTruth> {
+    let (queries, references) = (&retrieved.queries, &retrieved.references);
+    if let Some(path) = &args.ground_truth {
+        let file = GroundTruthFile::read(path)?;
+        ensure!(
+            file.len() == queries.names.len(),
+            "{}: {} rows for {} queries",
+            path.display(),
+            file.len(),
+            queries.names.len()
+        );
+        let (truth, n_clamped) = file.truth(references.names.len())?;
+        if n_clamped > 0 {
+            cli::note(&format!(
+                "warning: {}: {n_clamped} entries point past the {} references and are dropped",
+                path.display(),
+                references.names.len()
+            ));
+        }
+        return Ok(truth);
+    }
+    let (Some(query_poses), Some(reference_poses)) = (&queries.poses, &references.poses) else {
+        bail!(
+            "no positions: give --database-poses and --queries-poses, --ground-truth, or --no-labels"
+        );
+    };
+    ensure!(
+        queries.zone == references.zone,
+        "queries are in UTM zone {}, references in {}: their coordinates cannot be compared",
+        queries.zone,
+        references.zone
+    );
+    Ok(GroundTruth::within_radius(query_poses, reference_poses, args.positive_dist_threshold)?)
+}
+
+impl Named {
+    /// Images of a folder: by their `@` names, or in order of their numbers if positions are not
+    /// asked for.
+    fn folder(folder: &Path, needs_positions: bool) -> anyhow::Result<Self> {
+        if !needs_positions {
+            let names =
+                image_folder(folder).or_else(|_| UtmFolder::open(folder).map(|it| it.images))?;
+            return Ok(Self { names, poses: None, zone: String::new() });
+        }
+        let images = UtmFolder::open(folder)?;
+        let poses = Some(images.poses());
+        let zone = images.zones.into_iter().find(|zone| !zone.is_empty()).unwrap_or_default();
+        Ok(Self { names: images.images, poses, zone })
+    }
+
+    /// Rows of a pose table, as many as there are descriptors.
+    fn poses(path: &Path, n: usize) -> anyhow::Result<Self> {
+        let table = PoseTable::read(path)?;
+        ensure!(
+            table.names.len() == n,
+            "{}: {} poses for {n} descriptors",
+            path.display(),
+            table.names.len()
+        );
+        let names = table.names.into_iter().map(PathBuf::from).collect();
+        let poses: Option<Poses> = Some(table.poses);
+        Ok(Self { names, poses, zone: String::new() })
+    }
+
+    /// Rows without names.
+    fn numbered(n: usize) -> Self {
+        let names = (0..n).map(|row| PathBuf::from(row.to_string())).collect();
+        Self { names, poses: None, zone: String::new() }
+    }
+}

@@ -1,0 +1,77 @@
+//! `bench list`: techniques, datasets, metrics.
+
+use std::path::Path;
+
+use bench::{data::Data, technique::Technique};
+use clap::ValueEnum;
+use vpr_core::{
+    cli::{self, DataArgs, Outcome},
+    metrics::catalogue::CATALOGUE,
+};
+
+/// What to list.
+#[derive(clap::Args)]
+pub(crate) struct ListArgs {
+    /// What to list
+    #[arg(value_enum)]
+    what: What,
+    #[command(flatten)]
+    data: DataArgs,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum What {
+    /// Techniques, and whether they run here
+    Techniques,
+    /// Datasets, and whether they are at hand
+    Datasets,
+    /// Metrics, and the functions that compute them
+    Metrics,
+}
+
+pub(crate) fn run(args: &ListArgs) -> anyhow::Result<Outcome> {
+    let lines = match args.what {
+        What::Techniques => techniques(),
+        What::Datasets => datasets(&Data::new(&args.data.data, Path::new("data"))),
+        What::Metrics => metrics(),
+    };
+    cli::print(&(lines.join("\n") + "\n"))?;
+    Ok(Outcome::Success)
+}
+
+fn techniques() -> Vec<String> {
+    let line = |technique: Technique| {
+        let how = match technique {
+            Technique::Hog | Technique::CoHog => "runs on images, and from stored matches",
+            _ => "from stored matches",
+        };
+        format!("{:<12}{how}", technique.name())
+    };
+    Technique::ALL.into_iter().map(line).collect()
+}
+
+fn datasets(data: &Data) -> Vec<String> {
+    let mut lines = Vec::new();
+    for entry in data.entries() {
+        let at_hand = if data.find(&entry.path).is_some() { "at hand" } else { "absent" };
+        let count = |n: Option<usize>| n.map_or_else(|| "-".to_owned(), |n| n.to_string());
+        lines.push(format!(
+            "{:<22}{:<9}{:>6} queries {:>6} references  {}",
+            entry.id,
+            at_hand,
+            count(entry.queries),
+            count(entry.references),
+            entry.name,
+        ));
+    }
+    lines
+}
+
+fn metrics() -> Vec<String> {
+    let line = |metric: &vpr_core::metrics::catalogue::MetricInfo| {
+        format!("{:<24}{:<30}{}", metric.id, metric.name, metric.functions.join(", "))
+            .trim_end()
+            .to_owned()
+    };
+    CATALOGUE.iter().map(line).collect()
+}

@@ -1,0 +1,55 @@
+//! `bench map convert`: one format into another.
+
+use std::path::PathBuf;
+
+use vpr_core::{
+    cli::{self, Outcome},
+    map::{
+        OpenMap, Opening, RowType, copy_as,
+        door::{self, Format, Kind},
+    },
+};
+
+use super::{format_of, format_to};
+
+#[derive(clap::Args)]
+pub(super) struct ConvertArgs {
+    /// What to read
+    input: PathBuf,
+    /// Its format, if its name does not say it
+    #[arg(long, value_name = "FORMAT")]
+    from: Option<Format>,
+    /// What to write
+    out: PathBuf,
+    /// Its format, if its name does not say it
+    #[arg(long, value_name = "FORMAT")]
+    to: Option<Format>,
+    /// How a map stores descriptors: f32, f16 or int8
+    #[arg(long, value_name = "TYPE")]
+    row_type: Option<RowType>,
+}
+
+pub(super) fn run(args: &ConvertArgs) -> anyhow::Result<Outcome> {
+    let from = format_of(args.from, &args.input)?;
+    let to = format_to(args.to, &args.out)?;
+    if from == Format::Map && to == Format::Map {
+        // Row by row: the map may be larger than memory.
+        let map = OpenMap::open(&args.input, Opening::default())?;
+        let n = copy_as(&map, args.row_type.unwrap_or(map.row_type()), &args.out)?;
+        cli::note(&format!("wrote {n} references"));
+        return Ok(Outcome::Success);
+    }
+    if from.kind() == Kind::Pairs || to.kind() == Kind::Pairs {
+        let pairs = door::read_pairs(from, &args.input)?;
+        door::write_pairs(to, &args.out, &pairs)?;
+        cli::note(&format!("wrote the references of {} queries", pairs.lists.len()));
+        return Ok(Outcome::Success);
+    }
+    let parts = door::read(from, &args.input)?;
+    match (to, args.row_type) {
+        (Format::Map, Some(row_type)) => parts.write_map(&args.out, row_type),
+        _ => door::write(to, &args.out, &parts),
+    }
+    .map_err(|err| err.in_file(&args.input))?;
+    Ok(Outcome::Success)
+}

@@ -1,0 +1,8 @@
+//! The subcommands: each parses, calls the library and prints.
+
+pub(crate) mod evaluate;
+pub(crate) mod list;
+pub(crate) mod map;
+pub(crate) mod predictions;
+pub(crate) mod run;
+pub(crate) mod validate;

@@ -1,0 +1,86 @@
+//! `bench map` from descriptors to pairs and back.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use ndarray::Array2;
+use vpr_core::npy;
+
+fn bench(folder: &Path, args: &str) -> assert_cmd::assert::Assert {
+    let mut command = Command::cargo_bin("bench").unwrap();
+    command.current_dir(folder).arg("map").args(args.split_whitespace()).assert()
+}
+
+fn stdout(assert: &assert_cmd::assert::Assert) -> String {
+    String::from_utf8(assert.get_output().stdout.clone()).unwrap()
+}
+
+fn stderr(assert: &assert_cmd::assert::Assert) -> String {
+    String::from_utf8(assert.get_output().stderr.clone()).unwrap()
+}
+
+/// Four references on a line, in the plane and among the descriptors.
+fn references(folder: &Path) {
+    let rows = Array2::from_shape_fn((4, 3), |(row, column)| (row * (column + 1)) as f32);
+    npy::write_f32(&folder.join("refs.npy"), rows.view()).unwrap();
+    npy::write_f32(&folder.join("queries.npy"), (&rows + 0.25).view()).unwrap();
+    let poses = "name,easting,northing\na.jpg,0,0\nb.jpg,10,0\nc.jpg,20,0\nd.jpg,30,0\n";
+    std::fs::write(folder.join("refs.csv"), poses).unwrap();
+}
+
+#[test]
+fn build_search_verify() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    references(folder);
+    bench(folder, "build --descriptors refs.npy --encoder line --metric cosine m.safetensors")
+        .success();
+    let info = stdout(&bench(folder, "info m.safetensors").success());
+    assert!(info.contains("references: 4\ndimension: 3\n"), "{info}");
+    assert!(info.contains("encoder: line\n") && info.contains("metric: cosine\n"), "{info}");
+    bench(folder, "verify m.safetensors").success();
+    let args = "search m.safetensors --queries queries.npy -k 1 --metric euclidean";
+    let found = stdout(&bench(folder, args).success());
+    assert!(found.starts_with("query,rank,reference,distance\n0,1,a.jpg,0.433"), "{found}");
+    let near = stdout(&bench(folder, &format!("{args} --near 19,0,5")).success());
+    assert!(near.lines().skip(1).all(|line| line.contains(",c.jpg,")), "{near}");
+}
+
+#[test]
+fn damage_is_exit_code_one_and_no_map_is_two() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    references(folder);
+    bench(folder, "build --descriptors refs.npy m.safetensors").success();
+    let mut bytes = std::fs::read(folder.join("m.safetensors")).unwrap();
+    let last = bytes.len() - 1;
+    bytes[last] ^= 1;
+    std::fs::write(folder.join("m.safetensors"), &bytes).unwrap();
+    let verify = bench(folder, "verify m.safetensors").code(1);
+    assert!(stdout(&verify).starts_with("m.safetensors: tensor `block_digests`: "));
+    let search = bench(folder, "search m.safetensors --queries queries.npy").code(2);
+    assert!(stderr(&search).starts_with("error: m.safetensors: "), "{}", stderr(&search));
+    bench(folder, "info nothing.safetensors").code(2);
+}
+
+#[test]
+fn segments_merge_and_formats_convert() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    references(folder);
+    for _ in 0..2 {
+        bench(folder, "build --descriptors refs.npy --append city").success();
+    }
+    bench(folder, "verify city").code(0);
+    bench(folder, "merge city --out city.safetensors").success();
+    bench(folder, "convert city.safetensors half.safetensors --row-type f16").success();
+    let info = stdout(&bench(folder, "info half.safetensors").success());
+    assert!(info.contains("references: 8\ndimension: 3\nrow type: f16\n"), "{info}");
+    bench(folder, "convert refs.npy refs.h5").success();
+    bench(folder, "convert refs.h5 back.npy").success();
+    let [before, after] =
+        ["refs.npy", "back.npy"].map(|name| npy::read_f32(&folder.join(name)).unwrap());
+    assert_eq!(before, after);
+    let missing = bench(folder, "convert refs.h5 poses.tum").code(2);
+    assert_eq!(stderr(&missing), "error: refs.h5: content: no poses in the file\n");
+}

@@ -1,0 +1,95 @@
+//! `cargo bench -p vpr-core`: exact search by metric and batch, rows as f32, f16, int8 and signs.
+//!
+//! Machines differ in memory bandwidth more than in anything else: compare with `plain_read`, one
+//! pass over the same bytes.
+
+use std::hint::black_box;
+
+use divan::{Bencher, counter::BytesCount};
+use ndarray::Array2;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use vpr_core::{
+    Descriptors,
+    knn::{
+        F16Rows, Int8Rows, Metric, Pca, PcaParams, RowSource, SearchParams, SignRows, rescore,
+        search,
+    },
+};
+
+const N_REFERENCES: usize = 20_000;
+const DIM: usize = 512;
+
+fn main() {
+    divan::main();
+}
+
+fn unit_rows(n_rows: usize) -> Descriptors {
+    let mut rng = ChaCha8Rng::seed_from_u64(n_rows as u64);
+    let rows = Array2::from_shape_simple_fn((n_rows, DIM), || rng.random_range(-1.0_f32..1.0));
+    Descriptors::new(rows).expect("finite").normalized()
+}
+
+fn run(bencher: Bencher<'_, '_>, rows: &dyn RowSource, metric: Metric, batch: usize) {
+    let queries = unit_rows(batch);
+    let params = SearchParams { metric, ..SearchParams::default() };
+    bencher
+        .counter(BytesCount::of_many::<f32>(N_REFERENCES * DIM))
+        .bench_local(|| search(rows, black_box(&queries), &params).expect("valid"));
+}
+
+#[divan::bench(args = [1, 4, 100], sample_count = 20)]
+fn euclidean(bencher: Bencher<'_, '_>, batch: usize) {
+    run(bencher, &unit_rows(N_REFERENCES), Metric::Euclidean, batch);
+}
+
+#[divan::bench(args = [1, 4, 100], sample_count = 20)]
+fn inner_product(bencher: Bencher<'_, '_>, batch: usize) {
+    run(bencher, &unit_rows(N_REFERENCES), Metric::InnerProduct, batch);
+}
+
+#[divan::bench(args = [1, 100], sample_count = 10)]
+fn cosine(bencher: Bencher<'_, '_>, batch: usize) {
+    run(bencher, &unit_rows(N_REFERENCES), Metric::Cosine, batch);
+}
+
+#[divan::bench(args = [1, 100], sample_count = 10)]
+fn manhattan(bencher: Bencher<'_, '_>, batch: usize) {
+    run(bencher, &unit_rows(N_REFERENCES), Metric::Manhattan, batch);
+}
+
+#[divan::bench(args = [1, 100], sample_count = 10)]
+fn f16(bencher: Bencher<'_, '_>, batch: usize) {
+    let rows = F16Rows::encode(&unit_rows(N_REFERENCES)).expect("small values");
+    run(bencher, &rows, Metric::Euclidean, batch);
+}
+
+#[divan::bench(args = [1, 100], sample_count = 10)]
+fn int8(bencher: Bencher<'_, '_>, batch: usize) {
+    run(bencher, &Int8Rows::encode(&unit_rows(N_REFERENCES)), Metric::Euclidean, batch);
+}
+
+#[divan::bench(args = [1, 100], sample_count = 10)]
+fn signs_rescored(bencher: Bencher<'_, '_>, batch: usize) {
+    let (rows, queries) = (unit_rows(N_REFERENCES), unit_rows(batch));
+    let (signs, query_signs) = (SignRows::encode(&rows), SignRows::encode(&queries));
+    bencher.bench_local(|| {
+        let candidates = signs.nearest(black_box(&query_signs), 100);
+        rescore(&rows, &queries, &candidates, &SearchParams::default()).expect("valid")
+    });
+}
+
+#[divan::bench(sample_count = 2)]
+fn fit_pca_of_64(bencher: Bencher<'_, '_>) {
+    let rows = unit_rows(1000);
+    let params = PcaParams { n_components: 64, whiten: true };
+    bencher.bench_local(|| Pca::fit(black_box(&rows), &params).expect("valid"));
+}
+
+#[divan::bench(sample_count = 20)]
+fn plain_read(bencher: Bencher<'_, '_>) {
+    let rows = unit_rows(N_REFERENCES);
+    bencher.counter(BytesCount::of_many::<f32>(N_REFERENCES * DIM)).bench_local(|| {
+        black_box(rows.as_slice()).iter().fold(0, |all, value| all ^ value.to_bits())
+    });
+}

@@ -1,0 +1,175 @@
+//! The parsers, how each is called, and the sound files that damage starts from.
+
+use std::{fs, path::Path};
+
+use ndarray::Array2;
+use vpr_core::{
+    Descriptors, Error, PlanarPosition, Pose, Poses,
+    map::{
+        About, Coordinates, GrowingMap, RowType, UtmZone,
+        door::{self, Format, PairList, Pairs, Parts},
+        verify,
+    },
+    npy, pickle,
+};
+
+/// One parser.
+pub(crate) struct Target {
+    /// Also the name of its folder in the corpus.
+    pub(crate) name: &'static str,
+    /// The damaged file, relative to the folder of the test.
+    pub(crate) file: &'static str,
+    /// Reads the file in that folder; every problem it finds.
+    pub(crate) read: fn(&Path) -> Vec<Error>,
+    /// Whether no truncation and no flipped bit may go unnoticed.
+    pub(crate) notices_all: bool,
+}
+
+/// A target that reads the file `file` of a format.
+macro_rules! file_target {
+    ($name:literal, $file:literal, $format:expr) => {
+        Target {
+            name: $name,
+            file: $file,
+            read: |folder| door::problems($format, &folder.join($file)),
+            notices_all: false,
+        }
+    };
+}
+
+/// A target that reads the folder that `file` lies in.
+macro_rules! folder_target {
+    ($name:literal, $file:literal, $format:expr) => {
+        Target {
+            name: $name,
+            file: $file,
+            read: |folder| door::problems($format, folder),
+            notices_all: false,
+        }
+    };
+}
+
+pub(crate) const TARGETS: &[Target] = &[
+    Target {
+        name: "map",
+        file: "map.safetensors",
+        read: |folder| {
+            let path = folder.join("map.safetensors");
+            let read = door::read(Format::Map, &path).err();
+            let mut problems = verify(&path);
+            assert!(read.is_none() || !problems.is_empty(), "{read:?} is no problem for verify");
+            problems.extend(read);
+            problems
+        },
+        notices_all: true,
+    },
+    Target {
+        name: "manifest",
+        file: "manifest.json",
+        read: |folder| door::problems(Format::Map, folder),
+        notices_all: false,
+    },
+    file_target!("safetensors", "a.safetensors", Format::Safetensors),
+    file_target!("npz", "a.npz", Format::Npz),
+    file_target!("hloc-h5", "a.h5", Format::HlocH5),
+    file_target!("hloc-pairs", "a.txt", Format::HlocPairs),
+    file_target!("hloc-poses", "a.txt", Format::HlocPoses),
+    file_target!("tum", "a.txt", Format::Tum),
+    file_target!("kitti", "a.txt", Format::Kitti),
+    file_target!("latlon", "a.csv", Format::LatLon),
+    file_target!("csv", "a.csv", Format::PoseCsv),
+    file_target!("utm-names", "a.txt", Format::UtmNames),
+    folder_target!("7scenes", "frame-000000.pose.txt", Format::SevenScenes),
+    folder_target!("kapture-trajectories", "sensors/trajectories.txt", Format::Kapture),
+    folder_target!("vpr-eval", "database_descriptors.npy", Format::VprEval),
+    Target {
+        name: "vpr-eval-preds",
+        file: "preds/000.txt",
+        read: |folder| door::read_pairs(Format::VprEval, folder).err().into_iter().collect(),
+        notices_all: false,
+    },
+    Target {
+        name: "npy-objects",
+        file: "a.npy",
+        read: |folder| npy::read_objects(&folder.join("a.npy")).err().into_iter().collect(),
+        notices_all: false,
+    },
+    Target {
+        name: "pickle",
+        file: "a.pickle",
+        read: |folder| pickle::read(&folder.join("a.pickle")).err().into_iter().collect(),
+        notices_all: false,
+    },
+];
+
+fn parts(n: usize) -> Parts {
+    let pose = |row: usize| {
+        let turn = [0.1, 0.2, row as f64].into();
+        Pose::new([row as f64, -2.5, 0.25].into(), turn)
+    };
+    let descriptors =
+        Array2::from_shape_fn((n, 5), |(row, column)| (row * 5 + column) as f32 * 0.1);
+    Parts {
+        names: Some((0..n).map(|row| format!("db/frame-{row:06}.color.png")).collect()),
+        descriptors: Some(Descriptors::new(descriptors).unwrap()),
+        poses: Some(Poses::SixDof((0..n).map(pose).collect())),
+        about: About { encoder: Some("HOG".to_owned()), ..About::default() },
+    }
+}
+
+/// Writes one sound file of every format, and keeps what is there already.
+pub(crate) fn write_seeds(corpus: &Path) {
+    let folder = tempfile::tempdir().unwrap();
+    let seed = |target: &str, name: &str, file: &Path| {
+        let place = corpus.join(target);
+        fs::create_dir_all(&place).unwrap();
+        fs::copy(file, place.join(name)).unwrap();
+    };
+    let six_dof = parts(3);
+    for (target, format, row_type) in [
+        ("safetensors", Format::Safetensors, None),
+        ("npz", Format::Npz, None),
+        ("hloc-h5", Format::HlocH5, None),
+        ("hloc-poses", Format::HlocPoses, None),
+        ("tum", Format::Tum, None),
+        ("kitti", Format::Kitti, None),
+        ("csv", Format::PoseCsv, None),
+        ("map", Format::Map, Some(RowType::I8)),
+        ("map", Format::Map, Some(RowType::F16)),
+    ] {
+        let path = folder.path().join("seed");
+        let name = row_type.map_or("sound".to_owned(), |row_type| format!("sound-{row_type}"));
+        match row_type {
+            Some(row_type) => six_dof.write_map(&path, row_type).unwrap(),
+            None => door::write(format, &path, &six_dof).unwrap(),
+        }
+        seed(target, &name, &path);
+    }
+    let place = |name: &str| folder.path().join(name);
+    door::write(Format::SevenScenes, &place("scene"), &parts(1)).unwrap();
+    seed("7scenes", "sound", &place("scene/frame-000000.pose.txt"));
+    door::write(Format::Kapture, &place("kapture"), &six_dof).unwrap();
+    seed("kapture-trajectories", "sound", &place("kapture/sensors/trajectories.txt"));
+    door::write(Format::VprEval, &place("eval"), &six_dof).unwrap();
+    seed("vpr-eval", "sound", &place("eval/database_descriptors.npy"));
+    let list = |query: &str| PairList {
+        query: query.to_owned(),
+        references: vec!["db/1.jpg".to_owned(), "db/2.jpg".to_owned()],
+    };
+    let pairs = Pairs { lists: vec![list("q/1.jpg"), list("q/2.jpg")] };
+    door::write_pairs(Format::VprEval, &place("eval"), &pairs).unwrap();
+    seed("vpr-eval-preds", "sound", &place("eval/preds/000.txt"));
+    door::write_pairs(Format::HlocPairs, &place("pairs"), &pairs).unwrap();
+    seed("hloc-pairs", "sound", &place("pairs"));
+    let zone = UtmZone { number: 32, south: false };
+    let planar = vec![PlanarPosition::new(593_139.5, 5_763_197.8); 3];
+    let about = About { coordinates: Some(Coordinates::Utm(zone)), ..About::default() };
+    let planar = Parts { poses: Some(Poses::Planar(planar)), about, ..parts(3) };
+    door::write(Format::LatLon, &place("latlon"), &planar).unwrap();
+    seed("latlon", "sound", &place("latlon"));
+    door::write(Format::UtmNames, &place("utm"), &planar).unwrap();
+    seed("utm-names", "sound", &place("utm"));
+    let mut map = GrowingMap::open(&place("growing"), RowType::F32, About::default()).unwrap();
+    map.append(Array2::ones((2, 3)).view(), None, None).unwrap();
+    seed("manifest", "sound", &place("growing/manifest.json"));
+}
