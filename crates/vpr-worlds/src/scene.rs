@@ -4,7 +4,9 @@ use glam::{Vec2, Vec3, Vec3A};
 use obvhs::{
     BvhBuildParams,
     aabb::Aabb,
-    cwbvh::{CwBvh, builder::build_cwbvh},
+    bvh2::reinsertion::ReinsertionOptimizer,
+    cwbvh::{CwBvh, bvh2_to_cwbvh::bvh2_to_cwbvh},
+    ploc::PlocBuilder,
     ray::{Ray as Probe, RayHit},
 };
 
@@ -81,6 +83,9 @@ pub(crate) struct Scene {
     grid: LampGrid,
 }
 
+/// Boxes are this much larger than their shapes: more than an f32 is off 4 km from the origin.
+const SLACK: Vec3 = Vec3::splat(1e-3);
+
 /// Shapes of this extent would blow up every box of the hierarchy that holds them.
 const WIDE: f32 = 500.0;
 
@@ -94,11 +99,10 @@ impl Scene {
             .iter()
             .map(|shape| {
                 let (low, high) = shape.geometry.bounds();
-                Aabb::new(Vec3A::from(low), Vec3A::from(high))
+                Aabb::new(Vec3A::from(low - SLACK), Vec3A::from(high + SLACK))
             })
             .collect();
-        let mut time = std::time::Duration::ZERO;
-        let hierarchy = build_cwbvh(&bounds, BvhBuildParams::medium_build(), &mut time);
+        let hierarchy = hierarchy(&bounds);
         let grid = LampGrid::new(&lamps);
         let n_narrow = shapes.len() as u32;
         shapes.extend(wide);
@@ -150,6 +154,22 @@ impl Scene {
     pub(crate) fn lamps_near(&self, point: Vec3) -> &[u32] {
         self.grid.near(point)
     }
+}
+
+/// What `obvhs::cwbvh::builder::build_cwbvh` does, without its check of the result in builds with
+/// debug assertions: that one holds boxes to 10⁻⁵ m, which an f32 cannot keep beyond 100 m.
+fn hierarchy(bounds: &[Aabb]) -> CwBvh {
+    let params = BvhBuildParams::medium_build();
+    let indices = (0..bounds.len() as u32).collect();
+    let mut boxes = PlocBuilder::with_capacity(bounds.len()).build(
+        params.ploc_search_distance,
+        bounds,
+        indices,
+        params.sort_precision,
+        params.search_depth_threshold,
+    );
+    ReinsertionOptimizer::default().run(&mut boxes, params.reinsertion_batch_ratio, None);
+    bvh2_to_cwbvh(&boxes, params.max_prims_per_leaf.clamp(1, 3), true, false)
 }
 
 fn extent(geometry: &Geometry) -> Vec3 {
@@ -215,15 +235,22 @@ mod tests {
 
     #[test]
     fn the_hierarchy_finds_what_a_search_of_all_shapes_finds() {
+        for away in [0.0, 3_000.0] {
+            agree(Vec3::new(0.3 * away, away, 0.0));
+        }
+    }
+
+    fn agree(origin: Vec3) {
         let seed = Seed::new(4);
         let mut draft = Draft::default();
         for k in 0..300 {
             let own = seed.at(k);
-            let center = Vec3::new(
-                own.at(0).range(-9.0, 9.0),
-                own.at(1).range(-9.0, 9.0),
-                own.at(2).range(-3.0, 3.0),
-            );
+            let center = origin
+                + Vec3::new(
+                    own.at(0).range(-9.0, 9.0),
+                    own.at(1).range(-9.0, 9.0),
+                    own.at(2).range(-3.0, 3.0),
+                );
             let size = Vec3::new(
                 own.at(3).range(0.2, 1.5),
                 own.at(4).range(0.2, 1.5),
@@ -264,7 +291,7 @@ mod tests {
                 own.at(2).range(-0.4, 0.4),
             );
             let ray = Ray {
-                origin: Vec3::new(0.01, 0.02, own.at(3).unit()),
+                origin: origin + Vec3::new(0.01, 0.02, own.at(3).unit()),
                 direction: direction.normalize(),
             };
             let found = scene.nearest(&ray, 50.0).map(|hit| hit.t);

@@ -210,13 +210,14 @@ impl StreetKit {
     }
 }
 
-/// In how many columns the view is cut for people to stand in.
+/// In how many columns the view is cut for lorries to stand in.
 const COLUMNS: usize = 8;
 
-/// People right in front of a camera until `share` of its view's width is hidden.
+/// Lorries, and people before them, right in front of a camera until `share` of its view's width
+/// is hidden.
 ///
-/// The view is cut in columns; hidden ones are drawn without repetition, so the share is exact up
-/// to one column of [`COLUMNS`].
+/// The view is cut in columns; hidden ones are drawn without repetition and hidden from the bottom
+/// to the top, so the share is exact up to half a column of [`COLUMNS`].
 pub(crate) fn hide_behind(
     kit: &StreetKit,
     pose: &vpr_core::Pose,
@@ -224,21 +225,31 @@ pub(crate) fn hide_behind(
     share: f64,
     seed: Seed,
 ) -> Vec<Shape> {
-    let n_columns = COLUMNS;
-    let mut order: Vec<usize> = (0..n_columns).collect();
+    let mut order: Vec<usize> = (0..COLUMNS).collect();
     order.sort_by_key(|&column| seed.at(column as i64).bits());
     let half = 0.5 * f64::from(camera.width) / camera.focal;
+    let right = pose.rotation * nalgebra::Vector3::x();
+    let across = Vec2::new(right.x as f32, right.y as f32);
+    let n_hidden = (share * COLUMNS as f64).round() as usize;
     let mut shapes = Vec::new();
-    let n_hidden = (share * n_columns as f64).round() as usize;
     for &column in order.iter().take(n_hidden) {
         let own = seed.at(1_000 + column as i64);
-        // As wide as its column: a body is 0.6 m across the arms.
-        let depth = 0.6 * n_columns as f64 / (2.0 * half);
-        let across = (2.0 * (column as f64 + 0.5) / n_columns as f64 - 1.0) * half * depth;
-        let there = pose * nalgebra::Point3::new(across, 0.0, depth);
-        let foot = Vec3::new(there.x as f32, there.y as f32, pose.translation.z as f32 - 1.55);
-        let right = pose.rotation * nalgebra::Vector3::x();
-        kit.body(&mut shapes, foot, Vec2::new(right.x as f32, right.y as f32), own);
+        let at = |depth: f64| {
+            let aside = (2.0 * (column as f64 + 0.5) / COLUMNS as f64 - 1.0) * half * depth;
+            let there = pose * nalgebra::Point3::new(aside, 0.0, depth);
+            Vec3::new(there.x as f32, there.y as f32, pose.translation.z as f32 - 1.55)
+        };
+        let depth = 3.0;
+        let wide = (2.0 * half * depth / COLUMNS as f64) as f32;
+        let turn = across.normalize_or(Vec2::X);
+        let side = Geometry::Block {
+            center: at(depth) + Vec3::Z * 2.0,
+            half: Vec3::new(0.5 * wide, 0.01, 6.0),
+            turn,
+        };
+        let material = kit.cars[own.at(5).index(6)];
+        shapes.push(Shape { geometry: side, material, seed: own.bits(), moving: true });
+        kit.body(&mut shapes, at(2.2), across, own);
     }
     shapes
 }
