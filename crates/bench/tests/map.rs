@@ -1,5 +1,12 @@
 //! `bench map` from descriptors to pairs and back.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a test fails by panicking and says what it skips"
+)]
+
 use std::path::Path;
 
 use assert_cmd::Command;

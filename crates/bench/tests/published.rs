@@ -3,6 +3,12 @@
 //! Oracle: `data/golden/metrics/vprbench_oracle.csv`, six decimals, hence the tolerance of 1e-6. Runs
 //! where `VPR_DATA` names a folder with VPR-Bench's files; says `skipped:` otherwise.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a test fails by panicking and says what it skips"
+)]
 #![expect(
     clippy::unwrap_used,
     clippy::print_stdout,

@@ -3,6 +3,13 @@
 //! Machines differ in memory bandwidth more than in anything else: compare with `plain_read`, one
 //! pass over the same bytes.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "an example prints, and stops at the first error"
+)]
+
 use std::hint::black_box;
 
 use divan::{Bencher, counter::BytesCount};

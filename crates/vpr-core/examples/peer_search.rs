@@ -4,6 +4,13 @@
 //! `time <metric> <batch> <threads>` (answers milliseconds), `read <threads>` (milliseconds of one
 //! plain pass over the references) and `save <metric> <path>` (indices as u32, then distances).
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "an example prints, and stops at the first error"
+)]
+
 use std::{
     env,
     fs::{self, File},

@@ -4,6 +4,13 @@
 //! `search_scaling <folder>` writes `search-scaling.svg` and `search-scaling.md` there. Run it on a
 //! quiet machine; it needs 1.1 GB.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "an example prints, and stops at the first error"
+)]
+
 use std::{env, fmt::Write, fs, hint::black_box, path::Path, time::Instant};
 
 use anyhow::{Context, Result};

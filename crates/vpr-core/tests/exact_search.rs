@@ -1,5 +1,12 @@
 //! Exact search against the slow obvious version: the same indices, the same bits.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a test fails by panicking and says what it skips"
+)]
+
 use std::ops::Range;
 
 use ndarray::{Array2, s};

@@ -1,5 +1,12 @@
 //! Every door of the map: what is written is read, and what others wrote means what they meant.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a test fails by panicking and says what it skips"
+)]
+
 use std::path::{Path, PathBuf};
 
 use nalgebra::{UnitQuaternion, Vector3};

@@ -1,5 +1,12 @@
 //! Metrics against scikit-learn: the golden cases, and what must hold for any input.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a test fails by panicking and says what it skips"
+)]
+
 use std::{fs, path::PathBuf};
 
 use proptest::prelude::*;

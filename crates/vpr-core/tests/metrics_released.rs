@@ -1,5 +1,12 @@
 //! Published definitions against the released VPR-Bench functions, run on random traverses.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a test fails by panicking and says what it skips"
+)]
+
 use std::{fs, path::PathBuf};
 
 use serde::Deserialize;

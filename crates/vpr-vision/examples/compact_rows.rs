@@ -3,6 +3,13 @@
 //! Reads the 7-Scenes frames under `$VPR_DATA/7scenes`, describes them by HOG and prints a table in
 //! Markdown. Every fifth frame is a query, the others are references.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "an example prints, and stops at the first error"
+)]
+
 use std::{collections::HashSet, env, error::Error, hint::black_box, path::PathBuf, time::Instant};
 
 use ndarray::{Array2, Axis};

@@ -2,6 +2,13 @@
 //!
 //! `hog_time IMAGE.rgb`, where the file holds 512 × 512 × 3 bytes, red first.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "an example prints, and stops at the first error"
+)]
+
 use std::{
     env, fs,
     hint::black_box,

@@ -161,7 +161,9 @@ fn mean(descriptors: &Descriptors) -> Vec<f64> {
     for row in descriptors.view().outer_iter() {
         mean.iter_mut().zip(row).for_each(|(sum, &value)| *sum += f64::from(value));
     }
-    mean.iter_mut().for_each(|sum| *sum /= descriptors.len() as f64);
+    for sum in &mut mean {
+        *sum /= descriptors.len() as f64;
+    }
     mean
 }
 

@@ -4,6 +4,13 @@
 //! Runs on the stable compiler: deterministic mutations of a corpus that is kept here, and grows by
 //! every input that ever failed. `VPR_FUZZ_ROUNDS` sets how many inputs each format gets.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a test fails by panicking and says what it skips"
+)]
+
 mod mutate;
 mod targets;
 

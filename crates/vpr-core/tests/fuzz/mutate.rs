@@ -60,7 +60,7 @@ pub(crate) fn mangled(seed: &[u8], seeds: &[Vec<u8>], rng: &mut ChaCha8Rng) -> V
                 bytes.extend(&other[from..]);
             }
             _ => {
-                drop(bytes.splice(at..at, [b'[', b'(', b'{', b'@', b',', b'\n', 0x80].into_iter()))
+                drop(bytes.splice(at..at, [b'[', b'(', b'{', b'@', b',', b'\n', 0x80]));
             }
         }
     }

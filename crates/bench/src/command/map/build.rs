@@ -41,7 +41,7 @@ pub(super) struct BuildArgs {
     /// Digest of the encoder's weights, as sha256:…
     #[arg(long)]
     weights_digest: Option<String>,
-    /// Size of the images as the encoder saw them, WIDTHxHEIGHT
+    /// Size of the images as the encoder saw them, such as 640x480
     #[arg(long, value_name = "SIZE")]
     image_size: Option<ImageSize>,
     /// How images were resized

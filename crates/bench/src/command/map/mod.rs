@@ -7,7 +7,7 @@ mod merge;
 mod search;
 mod verify;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Subcommand;
 use vpr_core::{cli::Outcome, map::door::Format};
@@ -55,7 +55,7 @@ fn format_of(named: Option<Format>, path: &Path) -> anyhow::Result<Format> {
 }
 
 /// The format that was named, or the one that the extension of a new file shows.
-fn format_to(named: Option<Format>, path: &PathBuf) -> anyhow::Result<Format> {
+fn format_to(named: Option<Format>, path: &Path) -> anyhow::Result<Format> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
     match (named, &*extension) {
         (Some(format), _) => Ok(format),
