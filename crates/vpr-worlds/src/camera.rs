@@ -30,15 +30,24 @@ impl Camera {
     pub fn direction(&self, x: f64, y: f64) -> Vector3<f64> {
         let seen_x = (x - 0.5 * f64::from(self.width)) / self.focal;
         let seen_y = (y - 0.5 * f64::from(self.height)) / self.focal;
-        // Invert r (1 + k r²) by iteration: a contraction for the |k| ≤ 0.3 that recipes allow.
+        // Solve s (1 + k r² s²) = 1 by Newton; [`Self::is_one_to_one`] says where that has a solution.
+        let bend = self.distortion * (seen_x * seen_x + seen_y * seen_y);
         let mut scale = 1.0;
-        if self.distortion != 0.0 {
+        if bend != 0.0 {
             for _ in 0..12 {
-                let r2 = (seen_x * seen_x + seen_y * seen_y) * scale * scale;
-                scale = 1.0 / (1.0 + self.distortion * r2);
+                let excess = scale * (1.0 + bend * scale * scale) - 1.0;
+                scale -= excess / (1.0 + 3.0 * bend * scale * scale);
             }
         }
         Vector3::new(seen_x * scale, seen_y * scale, 1.0).normalize()
+    }
+
+    /// Whether the distortion leaves every pixel one direction: a strong barrel folds the corners.
+    pub(crate) fn is_one_to_one(&self) -> bool {
+        let corner = f64::from(self.width).hypot(f64::from(self.height)) * 0.5 / self.focal;
+        // r (1 + k r²) grows up to r² = -1 / 3k, where it is 2/3 r; keep 2 % away from there.
+        self.distortion >= 0.0
+            || corner < 0.98 * 2.0 / 3.0 * (-1.0 / (3.0 * self.distortion)).sqrt()
     }
 
     /// Image point of a point in the camera's frame; `None` behind the camera.
@@ -65,8 +74,9 @@ mod tests {
 
     #[test]
     fn projecting_a_pixels_direction_gives_the_pixel_back() {
-        for distortion in [0.0, 0.2, -0.2] {
+        for distortion in [0.0, 0.2, -0.15] {
             let camera = Camera { distortion, ..Camera::default() };
+            assert!(camera.is_one_to_one());
             for (x, y) in [(0.5, 0.5), (160.0, 120.0), (300.25, 17.5), (319.5, 239.5)] {
                 let back = camera.project(&(camera.direction(x, y) * 7.0)).unwrap();
                 assert!(
@@ -75,5 +85,11 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_barrel_that_folds_the_corners_is_noticed() {
+        // At the corner r = 0.87, but r (1 - 0.2 r²) never exceeds 0.86.
+        assert!(!Camera { distortion: -0.2, ..Camera::default() }.is_one_to_one());
     }
 }

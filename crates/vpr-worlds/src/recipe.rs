@@ -130,6 +130,17 @@ pub(crate) struct Refusal {
     pub(crate) reason: String,
 }
 
+/// The line of a byte, and the key that line sets.
+fn place(text: &str, at: usize) -> String {
+    let before = text.get(..at).unwrap_or(text);
+    let number = before.matches('\n').count() + 1;
+    let line = text.lines().nth(number - 1).unwrap_or_default();
+    match line.split_once('=') {
+        Some((key, _)) => format!("line {number}, `{}`", key.trim()),
+        None => format!("line {number}"),
+    }
+}
+
 fn one() -> usize {
     1
 }
@@ -161,12 +172,8 @@ impl Recipe {
     /// [`Error::Format`] names the key that is unknown, missing or out of its range.
     pub fn parse(text: &str, path: &Path) -> vpr_core::Result<Self> {
         let recipe: Self = toml::from_str(text).map_err(|error| {
-            let place = error.span().map_or_else(
-                || "recipe".to_owned(),
-                |span| {
-                    format!("line {}", text[..span.start.min(text.len())].lines().count().max(1))
-                },
-            );
+            let place =
+                error.span().map_or_else(|| "recipe".to_owned(), |span| place(text, span.start));
             Error::format(path, place, error.message())
         })?;
         recipe.check().map_err(|refusal| Error::format(path, refusal.key, refusal.reason))?;
@@ -191,6 +198,10 @@ impl Recipe {
         count("camera.height", self.camera.height as usize, 16, 2_048)?;
         between("camera.focal", self.camera.focal, 10.0, 10_000.0)?;
         between("camera.distortion", self.camera.distortion, -0.3, 0.3)?;
+        if !self.camera.is_one_to_one() {
+            let reason = format!("{} folds the corners of the image", self.camera.distortion);
+            return Err(Refusal { key: "camera.distortion", reason });
+        }
         if let Tolerance::RadiusM(radius) = self.tolerance {
             between("tolerance.radius_m", radius, 0.0, 10_000.0)?;
         }

@@ -96,6 +96,23 @@ fn depth_and_pose_agree_between_two_views_of_every_family() {
     }
 }
 
+/// Sum of squared differences of two patches of 7 × 7 pixels.
+fn cost(a: &GrayImage, from: (f64, f64), b: &GrayImage, to: (f64, f64)) -> f64 {
+    let mut sum = 0.0;
+    for dy in -3..=3_i32 {
+        for dx in -3..=3_i32 {
+            let at = |image: &GrayImage, (x, y): (f64, f64)| {
+                let (x, y) = (x as i32 + dx, y as i32 + dy);
+                let x = x.clamp(0, image.width() as i32 - 1) as u32;
+                let y = y.clamp(0, image.height() as i32 - 1) as u32;
+                f64::from(image.get_pixel(x, y).0[0])
+            };
+            sum += (at(a, from) - at(b, to)).powi(2);
+        }
+    }
+    sum
+}
+
 #[test]
 fn patches_are_found_where_depth_and_pose_predict_them() {
     let world = still(
@@ -107,33 +124,30 @@ fn patches_are_found_where_depth_and_pose_predict_them() {
         ],
     );
     let (a, b) = (frame(&world, Side::References), frame(&world, Side::Queries));
-    let cost = |from: (f64, f64), to: (f64, f64)| -> f64 {
-        let mut sum = 0.0;
-        for dy in -3..=3_i32 {
-            for dx in -3..=3_i32 {
-                let at = |image: &GrayImage, (x, y): (f64, f64)| {
-                    let (x, y) = (x as i32 + dx, y as i32 + dy);
-                    f64::from(image.get_pixel(x.clamp(0, 319) as u32, y.clamp(0, 239) as u32).0[0])
-                };
-                sum += (at(&a.image, from) - at(&b.image, to)).powi(2);
-            }
-        }
-        sum
-    };
     let mut errors = Vec::new();
+    let ring = [
+        (3.0, 0.0),
+        (-3.0, 0.0),
+        (0.0, 3.0),
+        (0.0, -3.0),
+        (2.0, 2.0),
+        (-2.0, 2.0),
+        (2.0, -2.0),
+        (-2.0, -2.0),
+    ];
     for (from, to) in predicted(&world, &a, &b) {
-        let moved = |dx: f64, dy: f64| cost(from, (to.0 + dx, to.1 + dy));
-        let away =
-            moved(4.0, 4.0).min(moved(-4.0, 4.0)).min(moved(4.0, -4.0)).min(moved(-4.0, -4.0));
-        // Only patches that look different four pixels away can tell where they are.
-        if away < 8_000.0 {
+        // Only corners can tell where they are: an edge looks the same further along.
+        let unlike =
+            |&(dx, dy): &(f64, f64)| cost(&a.image, from, &a.image, (from.0 + dx, from.1 + dy));
+        if ring.iter().map(unlike).fold(f64::INFINITY, f64::min) < 20_000.0 {
             continue;
         }
+        let moved = |dx: f64, dy: f64| cost(&a.image, from, &b.image, (to.0 + dx, to.1 + dy));
         let shifts = (-3..=3).flat_map(|dy| (-3..=3).map(move |dx| (f64::from(dx), f64::from(dy))));
         let best = shifts.min_by(|p, q| moved(p.0, p.1).total_cmp(&moved(q.0, q.1))).unwrap();
         errors.push(best.0.hypot(best.1));
     }
     let (n, error) = (errors.len(), median(errors));
     println!("median offset {error} px over {n} patches");
-    assert!(n > 100 && error < 0.5, "{error} px over {n} patches");
+    assert!(n > 50 && error < 0.5, "{error} px over {n} patches");
 }

@@ -22,7 +22,8 @@ fn listing_names_every_world_on_stdout() {
 
 #[test]
 fn nonsense_exits_with_2_and_names_the_key() {
-    let cases = [("places=-1", "places"), ("street.snow=1", "snow"), ("places=1000000000", "places")];
+    let cases =
+        [("places=-1", "places"), ("street.snow=1", "snow"), ("places=1000000000", "places")];
     for (set, part) in cases {
         let output = worlds(&["render", "world/street", "--set", set]);
         assert_eq!(output.status.code(), Some(2), "{set}");
