@@ -185,6 +185,11 @@ impl<'a> City<'a> {
         self.seed.named("look").at(avenue).at(block.rem_euclid(self.cycle)).at(thing)
     }
 
+    /// Blocks before and after the route: look-alikes must not be told apart by the city's end.
+    fn beyond(&self) -> i64 {
+        if self.street.look_alikes > 1 { 6 } else { MARGIN }
+    }
+
     fn build(&self, traverse: &Traverse, number: i64) -> (Scene, StreetKit) {
         let mut draft = Draft::default();
         let kit = StreetKit::new(&mut draft, self.seed.named("kit"));
@@ -199,7 +204,7 @@ impl<'a> City<'a> {
         let builder =
             Block { city: self, kit: &kit, grove: &grove, traverse, number, pavement, meadow };
         for avenue in -MARGIN..self.avenues + MARGIN {
-            for block in -MARGIN..self.blocks + MARGIN {
+            for block in -self.beyond()..self.blocks + self.beyond() {
                 let corner = Vec2::new(avenue as f32, block as f32) * PERIOD;
                 let low = (corner - Vec2::splat(ROAD + 30.0)).extend(0.0);
                 let road =

@@ -215,7 +215,7 @@ fn foliage(colour: Colour, evergreen: bool, touch: &Touch, season: &Season) -> P
 }
 
 fn meadow(colour: Colour, touch: &Touch, season: &Season) -> Paint {
-    let at = Vec2::new(touch.point.x, touch.point.y);
+    let at = touch.spot.uv;
     let broad = cloudy(touch.seed, at * 0.05, 4, 0.05 * touch.footprint);
     let fine = cloudy(touch.seed ^ 3, at * 3.0, 3, 3.0 * touch.footprint);
     let dry = colour.lerp(rgb(150, 132, 80), (0.3 + 0.5 * season.autumn) * step(0.4, 0.7, broad));
