@@ -1,0 +1,1 @@
+//! Aggregators: from a feature map to one descriptor per image.

@@ -1,0 +1,1 @@
+//! Encoders: from image files to descriptors.

@@ -1,0 +1,1 @@
+//! Losses of place-recognition training.

@@ -1,0 +1,1 @@
+//! Published weights: read key by key, never executed.

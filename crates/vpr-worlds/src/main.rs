@@ -1,0 +1,95 @@
+//! The `worlds` program: lists, renders and previews generated places.
+
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
+
+use anyhow::Context;
+use clap::{Args as ClapArgs, Parser, Subcommand};
+use vpr_core::cli::{self, Outcome};
+use vpr_worlds::{Recipe, World, names, preview, recipe_with};
+
+/// Generated places with exact poses and quantified nuisances.
+#[derive(Parser)]
+#[command(version, about, propagate_version = true)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// List the worlds, one a line: name, places, layout, counterpart
+    List,
+    /// Render worlds into the cache and print their folders
+    Render {
+        #[command(flatten)]
+        which: Which,
+        /// Folder that keeps rendered worlds
+        #[arg(long, env = "VPR_CACHE", value_name = "DIR", default_value = "target/worlds")]
+        cache: PathBuf,
+    },
+    /// Write a contact sheet of references and queries side by side
+    Preview {
+        #[command(flatten)]
+        which: Which,
+        /// The PNG to write
+        #[arg(long, short, value_name = "FILE", default_value = "preview.png")]
+        output: PathBuf,
+        /// Number of queries on the sheet
+        #[arg(long, value_name = "N", default_value_t = 9)]
+        queries: usize,
+    },
+}
+
+#[derive(ClapArgs)]
+struct Which {
+    /// A name as `world/street`, or the path of a recipe
+    #[arg(value_name = "WORLD")]
+    world: String,
+    /// Set a key of the recipe, as `queries.condition.darkness=0.5`
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    settings: Vec<String>,
+}
+
+impl Which {
+    fn recipe(&self) -> anyhow::Result<Recipe> {
+        let pairs = self.settings.iter().map(|setting| {
+            setting.split_once('=').with_context(|| format!("`{setting}` is not KEY=VALUE"))
+        });
+        let settings: Vec<(&str, &str)> = pairs.collect::<Result<_, _>>()?;
+        let path = Path::new(&self.world);
+        if path.extension().is_some_and(|extension| extension == "toml") {
+            return Ok(Recipe::read_with(path, &settings)?);
+        }
+        Ok(recipe_with(&self.world, &settings)?)
+    }
+}
+
+fn main() -> ExitCode {
+    cli::main(|| {
+        match Args::parse().command {
+            Command::List => {
+                for name in names() {
+                    let recipe = recipe_with(name, &[])?;
+                    let line = format!("world/{name}\t{}\t{}\n", recipe.places, recipe.counterpart);
+                    cli::print(&line)?;
+                }
+            }
+            Command::Render { which, cache } => {
+                let recipe = which.recipe()?;
+                let bar = cli::progress(&recipe.name, World::count(&recipe)?);
+                let world = World::open(&recipe, &cache, &|| bar.inc(1))?;
+                bar.finish_and_clear();
+                cli::print(&format!("{}\n", world.folder.display()))?;
+            }
+            Command::Preview { which, output, queries } => {
+                let sheet = preview(&which.recipe()?, queries, 3)?;
+                sheet.save(&output).with_context(|| output.display().to_string())?;
+                cli::note(&format!("generated: {}", output.display()));
+            }
+        }
+        Ok(Outcome::Success)
+    })
+}
