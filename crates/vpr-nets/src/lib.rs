@@ -3,6 +3,7 @@
 pub mod aggregate;
 pub mod backbone;
 pub mod encode;
+pub mod layer;
 pub mod local;
 pub mod loss;
 pub mod train;
