@@ -74,7 +74,7 @@ fn reproduce(root: &Path, id: &str, args: &Args) -> anyhow::Result<u8> {
     let chapter = read(root, id)?.chapter;
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
-    command.current_dir(root).args(["run", "--quiet", "--package", &chapter, "--bin", &chapter]);
+    command.current_dir(root).args(["run", "--quiet", "--bin", &chapter]);
     command.args(["--", "run"]).arg(format!("experiments/{id}.toml"));
     let data = env::current_dir().context("current folder")?.join(&args.data);
     command.arg("--data").arg(data).args(["--format", &args.format]);

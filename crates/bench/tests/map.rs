@@ -7,23 +7,40 @@
     reason = "a test fails by panicking and says what it skips"
 )]
 
-use std::path::Path;
+use std::{
+    path::Path,
+    process::{Command, Output},
+};
 
-use assert_cmd::Command;
 use ndarray::Array2;
 use vpr_core::npy;
 
-fn bench(folder: &Path, args: &str) -> assert_cmd::assert::Assert {
-    let mut command = Command::cargo_bin("bench").unwrap();
-    command.current_dir(folder).arg("map").args(args.split_whitespace()).assert()
+/// A program that has ended.
+struct Ended(Output);
+
+impl Ended {
+    fn success(self) -> Self {
+        self.code(0)
+    }
+
+    fn code(self, expected: i32) -> Self {
+        assert_eq!(self.0.status.code(), Some(expected), "{}", stderr(&self));
+        self
+    }
 }
 
-fn stdout(assert: &assert_cmd::assert::Assert) -> String {
-    String::from_utf8(assert.get_output().stdout.clone()).unwrap()
+fn bench(folder: &Path, args: &str) -> Ended {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
+    let output = command.current_dir(folder).arg("map").args(args.split_whitespace()).output();
+    Ended(output.expect("the program starts"))
 }
 
-fn stderr(assert: &assert_cmd::assert::Assert) -> String {
-    String::from_utf8(assert.get_output().stderr.clone()).unwrap()
+fn stdout(ended: &Ended) -> String {
+    String::from_utf8(ended.0.stdout.clone()).unwrap()
+}
+
+fn stderr(ended: &Ended) -> String {
+    String::from_utf8(ended.0.stderr.clone()).unwrap()
 }
 
 /// Four references on a line, in the plane and among the descriptors.
