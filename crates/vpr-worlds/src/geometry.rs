@@ -115,8 +115,9 @@ impl Geometry {
                 let inside = (0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b);
                 (inside && t > NEAR && t < limit).then_some(t)
             }
-            Self::Facet { corners: [a, b, c], .. } => {
-                let (t, s, r) = hit_plane(ray, a, b - a, c - a)?;
+            Self::Facet { corners, .. } => {
+                let [corner, second, third] = corners;
+                let (t, s, r) = hit_plane(ray, corner, second - corner, third - corner)?;
                 let inside = s >= 0.0 && r >= 0.0 && s + r <= 1.0;
                 (inside && t > NEAR && t < limit).then_some(t)
             }
@@ -151,8 +152,9 @@ impl Geometry {
                 let extent = Vec2::new(length_u, length_v);
                 Spot { u, v, normal, uv, extent, face: 4 }
             }
-            Self::Facet { corners: [a, b, c], normals } => {
-                let (s, r) = barycentric(point, a, b - a, c - a);
+            Self::Facet { corners, normals } => {
+                let [corner, second, third] = corners;
+                let (s, r) = barycentric(point, corner, second - corner, third - corner);
                 let normal = normals[0] * (1.0 - s - r) + normals[1] * s + normals[2] * r;
                 let normal = normal.normalize_or(Vec3::Z);
                 let normal = if normal.dot(direction) > 0.0 { -normal } else { normal };

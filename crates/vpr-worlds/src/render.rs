@@ -118,22 +118,18 @@ fn trace(view: &View<'_>, ray: &Ray) -> Sample {
             (limit, near) = (t, Some(shape));
         }
     }
-    let (shape, number, t) = match view.scene.nearest(ray, limit) {
-        Some(hit) => (&view.scene.shapes[hit.shape as usize], hit.shape, hit.t),
-        None => match near {
-            Some(shape) => (shape, u32::MAX - 1, limit),
-            None => {
-                let colour = view.light.sky(ray.direction);
-                let normal = -ray.direction;
-                return Sample {
-                    colour,
-                    distance: f32::INFINITY,
-                    shape: u32::MAX,
-                    normal,
-                    moving: false,
-                };
-            }
-        },
+    let (shape, number, t) = if let Some(hit) = view.scene.nearest(ray, limit) {
+        (&view.scene.shapes[hit.shape as usize], hit.shape, hit.t)
+    } else if let Some(shape) = near {
+        (shape, u32::MAX - 1, limit)
+    } else {
+        return Sample {
+            colour: view.light.sky(ray.direction),
+            distance: f32::INFINITY,
+            shape: u32::MAX,
+            normal: -ray.direction,
+            moving: false,
+        };
     };
     let point = ray.at(t);
     let spot = shape.geometry.spot(point, ray.direction);
@@ -146,12 +142,13 @@ fn trace(view: &View<'_>, ray: &Ray) -> Sample {
         seed: shape.seed,
     };
     let material = &view.scene.materials[shape.material as usize];
-    let paint = material.paint(&touch, &view.light.season);
-    let colour = shade(view, ray, &touch, paint);
+    let covered = material.paint(&touch, &view.light.season);
+    let sunk = covered.sunk;
+    let colour = shade(view, ray, &touch, covered);
     let clear = view.light.clear(t);
     Sample {
         colour: view.light.horizon.lerp(colour, clear),
-        distance: t + paint.sunk,
+        distance: t + sunk,
         shape: number,
         normal: spot.normal,
         moving: shape.moving,

@@ -240,6 +240,18 @@ mod tests {
         }
     }
 
+    fn some_shape(kind: i64, center: Vec3, size: Vec3, seed: Seed) -> Geometry {
+        match kind % 5 {
+            0 => Geometry::block(center, size, seed.unit() * 6.0),
+            1 => Geometry::ball(center, size),
+            2 => {
+                Geometry::Pillar { base: center, height: size.z, bottom: size.x, top: 0.5 * size.y }
+            }
+            3 => Geometry::Patch { corner: center, u: size, v: Vec3::new(-size.y, size.x, 0.3) },
+            _ => Geometry::triangle(center, center + size, center + Vec3::new(0.0, -1.0, 1.0)),
+        }
+    }
+
     fn agree(origin: Vec3) {
         let seed = Seed::new(4);
         let mut draft = Draft::default();
@@ -256,30 +268,7 @@ mod tests {
                 own.at(4).range(0.2, 1.5),
                 own.at(5).range(0.2, 1.5),
             );
-            draft.add(
-                match k % 5 {
-                    0 => Geometry::block(center, size, own.at(6).unit() * 6.0),
-                    1 => Geometry::ball(center, size),
-                    2 => Geometry::Pillar {
-                        base: center,
-                        height: size.z,
-                        bottom: size.x,
-                        top: 0.5 * size.y,
-                    },
-                    3 => Geometry::Patch {
-                        corner: center,
-                        u: size,
-                        v: Vec3::new(-size.y, size.x, 0.3),
-                    },
-                    _ => Geometry::triangle(
-                        center,
-                        center + size,
-                        center + Vec3::new(0.0, -1.0, 1.0),
-                    ),
-                },
-                0,
-                0,
-            );
+            draft.add(some_shape(k, center, size, own.at(6)), 0, 0);
         }
         let scene = Scene::new(draft);
         let mut n_hits = 0;

@@ -175,7 +175,7 @@ fn folder_name(recipe: &Recipe, text: &str) -> Result<String> {
         .chain_update(text)
         .chain_update(files)
         .finalize();
-    let short: String = digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    let short = hex(&digest[..8]);
     Ok(format!("{}-{short}", recipe.name))
 }
 
@@ -327,6 +327,11 @@ fn digest(root: &Path) -> Result<(usize, u64, String)> {
     for (_, part) in &parts {
         all.update(part);
     }
-    let hex = all.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    Ok((files.len(), parts.iter().map(|(length, _)| length).sum(), hex))
+    let n_bytes = parts.iter().map(|(length, _)| length).sum();
+    Ok((files.len(), n_bytes, hex(&all.finalize())))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    let digits: Vec<String> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+    digits.concat()
 }

@@ -143,17 +143,8 @@ impl Walk<'_> {
                 let foot = Vec3::new(side * (half + 0.3), y + 3.0, 0.0);
                 kit.lamp(&mut draft, foot, Vec2::new(-side * 0.8, 0.0), look.at(4));
             }
-            for person in 0..3 {
-                let now = self.seed.named("people").at(number).at(stretch).at(person);
-                if now.at(0).chance(0.6 * traverse.condition.traffic as f32) {
-                    let at = Vec3::new(
-                        now.at(1).range(-half, half),
-                        y + now.at(2).range(0.0, STRETCH),
-                        0.0,
-                    );
-                    kit.person(&mut draft, at, now.at(3));
-                }
-            }
+            let now = self.seed.named("people").at(number).at(stretch);
+            people(&mut draft, &kit, (half, y), traverse, now);
         }
         (Scene::new(draft), kit)
     }
@@ -164,58 +155,8 @@ impl Walk<'_> {
         } else {
             own.named("model")
         };
-        let wall = model.at(0).pick(&[
-            Wall::Brick,
-            Wall::Concrete,
-            Wall::Concrete,
-            Wall::Plaster,
-            Wall::Stone,
-        ]);
-        let floor = model.at(1).range(3.2, 4.0);
-        let n_floors = 1 + model.at(2).index(5);
-        let opening = Opening {
-            share: model.at(3).range(0.5, 0.95),
-            sill: model.at(4).range(0.5, 1.1),
-            height: model.at(5).range(1.4, 2.1),
-            arched: false,
-            panes: model.at(6).pick(&[(1, 1), (2, 1), (3, 1), (4, 2)]),
-            shutters: None,
-            inset: model.at(7).range(0.1, 0.35),
-        };
-        let colour = if wall == Wall::Brick {
-            rgb(156, 92, 70)
-        } else {
-            hue(
-                model.at(8).range(0.02, 0.16),
-                model.at(9).range(0.0, 0.25),
-                model.at(10).range(0.6, 0.9),
-            )
-        };
-        let front = if model.at(11).chance(0.4) {
-            let shop = own.at(12).bits();
-            Front::Shop {
-                ground: hue(model.at(13).unit(), 0.4, 0.35),
-                ink: rgb(240, 240, 230),
-                shop,
-            }
-        } else {
-            Front::Home { door: hue(model.at(14).unit(), 0.5, 0.4) }
-        };
-        let trim = hue(model.at(15).unit(), 0.15, 0.7);
-        let facade = Facade {
-            wall,
-            colour,
-            trim,
-            frame: Vec3::splat(model.at(16).range(0.02, 0.7)),
-            floor,
-            ground: 4.0,
-            bay: model.at(17).range(2.4, 5.0),
-            opening,
-            front,
-            face: 255,
-            bands: model.at(18).chance(0.6),
-            quoins: false,
-        };
+        let facade = front(model, own.at(12).bits());
+        let (floor, n_floors) = (facade.floor, 1 + model.at(2).index(5));
         let facade = draft.material(Material::Facade(Box::new(facade)));
         let away = 0.5 * self.campus.path_m as f32 + own.at(20).range(0.6, 9.0);
         let (near, far) = (side * away, side * (away + 16.0));
@@ -239,12 +180,84 @@ impl Walk<'_> {
             );
         }
         if own.at(26).chance(0.6) {
-            for panel in 0..1 + own.at(27).index(3) as i64 {
-                let x = near - side * 0.06;
-                let at = Vec3::new(x, y + 4.0 + 4.5 * panel as f32, own.at(28).range(1.5, 2.0));
-                let size = Vec3::new(0.05, own.at(29).range(0.8, 2.0), own.at(30).range(0.8, 1.6));
-                draft.add(Geometry::block(at, size, 0.0), ground.poster, own.at(31 + panel).bits());
-            }
+            panels(draft, ground, (near - side * 0.06, y), own);
+        }
+    }
+}
+
+/// Posters and boards along a front.
+fn panels(draft: &mut Draft, ground: &Ground, (x, y): (f32, f32), own: Seed) {
+    for panel in 0..=own.at(27).index(3) as i64 {
+        let at = Vec3::new(x, y + 4.0 + 4.5 * panel as f32, own.at(28).range(1.5, 2.0));
+        let sheet = Vec3::new(0.05, own.at(29).range(0.8, 2.0), own.at(30).range(0.8, 1.6));
+        draft.add(Geometry::block(at, sheet, 0.0), ground.poster, own.at(31 + panel).bits());
+    }
+}
+
+/// How a building of this model looks; `shop` names the shop, if it has one.
+fn front(model: Seed, shop: u32) -> Facade {
+    let wall = model.at(0).pick(&[
+        Wall::Brick,
+        Wall::Concrete,
+        Wall::Concrete,
+        Wall::Plaster,
+        Wall::Stone,
+    ]);
+    let floor = model.at(1).range(3.2, 4.0);
+    let opening = Opening {
+        share: model.at(3).range(0.5, 0.95),
+        sill: model.at(4).range(0.5, 1.1),
+        height: model.at(5).range(1.4, 2.1),
+        arched: false,
+        panes: model.at(6).pick(&[(1, 1), (2, 1), (3, 1), (4, 2)]),
+        shutters: None,
+        inset: model.at(7).range(0.1, 0.35),
+    };
+    let colour = if wall == Wall::Brick {
+        rgb(156, 92, 70)
+    } else {
+        hue(
+            model.at(8).range(0.02, 0.16),
+            model.at(9).range(0.0, 0.25),
+            model.at(10).range(0.6, 0.9),
+        )
+    };
+    let front = if model.at(11).chance(0.4) {
+        Front::Shop { ground: hue(model.at(13).unit(), 0.4, 0.35), ink: rgb(240, 240, 230), shop }
+    } else {
+        Front::Home { door: hue(model.at(14).unit(), 0.5, 0.4) }
+    };
+    let trim = hue(model.at(15).unit(), 0.15, 0.7);
+    Facade {
+        wall,
+        colour,
+        trim,
+        frame: Vec3::splat(model.at(16).range(0.02, 0.7)),
+        floor,
+        ground: 4.0,
+        bay: model.at(17).range(2.4, 5.0),
+        opening,
+        front,
+        face: 255,
+        bands: model.at(18).chance(0.6),
+        quoins: false,
+    }
+}
+
+/// Up to three people on a stretch of the path.
+fn people(
+    draft: &mut Draft,
+    kit: &StreetKit,
+    (half, y): (f32, f32),
+    traverse: &Traverse,
+    seed: Seed,
+) {
+    for person in 0..3 {
+        let now = seed.at(person);
+        if now.at(0).chance(0.6 * traverse.condition.traffic as f32) {
+            let across = now.at(1).range(-half, half);
+            let at = Vec3::new(across, y + now.at(2).range(0.0, STRETCH), 0.0);
+            kit.person(draft, at, now.at(3));
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::{
     geometry::Geometry,
     light::Light,
     material::{Material, rgb},
-    parts::{Furnisher, Room},
+    parts::{Furnisher, Room, shell},
     recipe::{Offset, Recipe, Refusal, Traverse, between, count},
     scene::{Draft, Lamp, Scene},
     seed::Seed,
@@ -184,7 +184,7 @@ impl Visit<'_> {
                 low,
                 high: low + Vec3::new(2.0 * half, SECTION, look.at(3).range(2.5, 3.1)),
             };
-            self.sides(draft, &room, look);
+            sides(draft, &room, look);
             for (corner, inward, key) in
                 [(low, Vec3::X, 0), (low + Vec3::X * 2.0 * half, -Vec3::X, 1)]
             {
@@ -206,40 +206,11 @@ impl Visit<'_> {
         draft.add(Geometry::span(Vec3::new(-half, y - 0.1, 0.0), Vec3::new(half, y, 3.1)), end, 0);
     }
 
-    /// Floor, ceiling and the two walls along y, without the ends.
-    fn sides(&self, draft: &mut Draft, room: &Room, look: Seed) {
-        let mut whole = Draft::default();
-        std::mem::swap(&mut whole.materials, &mut draft.materials);
-        self.furnisher.shell(&mut whole, room, look);
-        std::mem::swap(&mut whole.materials, &mut draft.materials);
-        // A shell is floor, ceiling, and the walls at low y, low x, high y, high x.
-        let keep = [0, 1, 3, 5];
-        draft.shapes.extend(keep.map(|index| whole.shapes[index].clone()));
-        let beam = draft.material(Material::Plain { colour: rgb(120, 118, 112), gloss: 0.0 });
-        let (low, high) = (room.low, room.high);
-        for x in [low.x, high.x - 0.12] {
-            let low = Vec3::new(x, low.y - 0.15, 0.0);
-            draft.add(
-                Geometry::span(low, Vec3::new(x + 0.12, low.y + 0.3, high.z)),
-                beam,
-                look.bits(),
-            );
-        }
-        draft.add(
-            Geometry::span(
-                Vec3::new(low.x, low.y - 0.15, high.z - 0.25),
-                Vec3::new(high.x, low.y + 0.15, 3.4),
-            ),
-            beam,
-            look.bits(),
-        );
-    }
-
     fn rooms(&self, draft: &mut Draft, n: usize) {
         for number in 0..n.div_ceil(self.interior.places_per_room) {
             let room = room(number, self.seed);
             let look = self.look(number as i64);
-            self.furnisher.shell(draft, &room, look);
+            shell(draft, &room, look);
             self.furnisher.furnish(
                 draft,
                 &room,
@@ -289,21 +260,7 @@ impl Visit<'_> {
             let u = Vec3::new(0.0, length + 12.0, RISE * (length + 12.0));
             draft.add(Geometry::Patch { corner, u, v: v * 2.0 }, band, 1);
             draft.add(Geometry::Patch { corner: corner + v * 2.0, u, v: v * 3.6 }, tile, 2);
-            for poster in 0..(length / 2.2) as i64 {
-                let own = self.seed.named("poster").at(key).at(poster);
-                let own = if own.at(5).chance(self.change().1) {
-                    self.change().0.at(poster)
-                } else {
-                    own
-                };
-                let y = poster as f32 * 2.2 + own.at(0).range(0.0, 0.8);
-                let size = Vec3::new(0.06, own.at(1).range(0.5, 1.1), own.at(2).range(0.7, 1.4));
-                draft.add(
-                    Geometry::block(Vec3::new(x, y, up(y) + 1.7), size, 0.0),
-                    picture,
-                    own.bits(),
-                );
-            }
+            self.posters(draft, length, (x, key), picture);
         }
         let corner = Vec3::new(left, -6.0, up(-6.0) + 4.4);
         let roof = Vec3::new(0.0, length + 12.0, RISE * (length + 12.0));
@@ -333,9 +290,26 @@ impl Visit<'_> {
                 4,
             );
         }
+        self.shaft_lamps(draft, length);
+    }
+
+    /// Posters along one wall of the escalators' shaft.
+    fn posters(&self, draft: &mut Draft, length: f32, (x, key): (f32, i64), picture: u32) {
+        for poster in 0..(length / 2.2) as i64 {
+            let own = self.seed.named("poster").at(key).at(poster);
+            let (visit, changed) = self.change();
+            let own = if own.at(5).chance(changed) { visit.at(poster) } else { own };
+            let y = poster as f32 * 2.2 + own.at(0).range(0.0, 0.8);
+            let size = Vec3::new(0.06, own.at(1).range(0.5, 1.1), own.at(2).range(0.7, 1.4));
+            let sheet = Geometry::block(Vec3::new(x, y, RISE * y + 1.7), size, 0.0);
+            draft.add(sheet, picture, own.bits());
+        }
+    }
+
+    fn shaft_lamps(&self, draft: &mut Draft, length: f32) {
         for lamp in 0..(length / 3.5) as i64 {
             let y = lamp as f32 * 3.5;
-            let position = Vec3::new(0.5 * LANES, y, up(y) + 4.0);
+            let position = Vec3::new(0.5 * LANES, y, RISE * y + 4.0);
             if self.seed.named("lamps").at(lamp).chance(self.lit()) {
                 draft.lamps.push(Lamp {
                     position,
@@ -346,4 +320,29 @@ impl Visit<'_> {
             }
         }
     }
+}
+
+/// Floor, ceiling and the two walls along y, without the ends.
+fn sides(draft: &mut Draft, room: &Room, look: Seed) {
+    let mut whole = Draft::default();
+    std::mem::swap(&mut whole.materials, &mut draft.materials);
+    shell(&mut whole, room, look);
+    std::mem::swap(&mut whole.materials, &mut draft.materials);
+    // A shell is floor, ceiling, and the walls at low y, low x, high y, high x.
+    let keep = [0, 1, 3, 5];
+    draft.shapes.extend(keep.map(|index| whole.shapes[index].clone()));
+    let beam = draft.material(Material::Plain { colour: rgb(120, 118, 112), gloss: 0.0 });
+    let (low, high) = (room.low, room.high);
+    for x in [low.x, high.x - 0.12] {
+        let low = Vec3::new(x, low.y - 0.15, 0.0);
+        draft.add(Geometry::span(low, Vec3::new(x + 0.12, low.y + 0.3, high.z)), beam, look.bits());
+    }
+    draft.add(
+        Geometry::span(
+            Vec3::new(low.x, low.y - 0.15, high.z - 0.25),
+            Vec3::new(high.x, low.y + 0.15, 3.4),
+        ),
+        beam,
+        look.bits(),
+    );
 }

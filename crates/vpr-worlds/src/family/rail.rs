@@ -149,17 +149,11 @@ impl Line<'_> {
         self.track(&mut draft);
         self.woods(&mut draft, &grove, &inside, &beside);
         for (k, &start) in (0..).zip(&tunnels) {
-            self.tunnel(&mut draft, start, self.seed.named("tunnel").at(k));
+            tunnel(&mut draft, start, self.seed.named("tunnel").at(k));
         }
         for (k, &start) in (0..).zip(&stations) {
             let people = self.seed.named("people").at(number).at(k);
-            self.station(
-                &mut draft,
-                &kit,
-                start,
-                self.seed.named("station").at(k),
-                (people, traverse),
-            );
+            station(&mut draft, &kit, start, self.seed.named("station").at(k), (people, traverse));
         }
         self.farms(&mut draft, &beside);
         Scene::new(draft)
@@ -189,13 +183,18 @@ impl Line<'_> {
         };
         let n_rows = ((self.length + 900.0) / ALONG) as i32;
         for row in -12..n_rows {
-            let (y, next) = (row as f32 * ALONG, (row + 1) as f32 * ALONG);
+            let (from, to) = (row as f32 * ALONG, (row + 1) as f32 * ALONG);
             for pair in ACROSS.windows(2) {
-                let corners = [(pair[0], y), (pair[1], y), (pair[1], next), (pair[0], next)];
-                let [a, b, c, d] = corners.map(|(x, y)| point(x, y));
-                let [na, nb, nc, nd] = corners.map(|(x, y)| normal(x, y));
-                draft.add(Geometry::Facet { corners: [a, b, c], normals: [na, nb, nc] }, meadow, 5);
-                draft.add(Geometry::Facet { corners: [a, c, d], normals: [na, nc, nd] }, meadow, 5);
+                let corners = [(pair[0], from), (pair[1], from), (pair[1], to), (pair[0], to)];
+                let points = corners.map(|(across, y)| point(across, y));
+                let normals = corners.map(|(across, y)| normal(across, y));
+                for half in [[0, 1, 2], [0, 2, 3]] {
+                    let facet = Geometry::Facet {
+                        corners: half.map(|k| points[k]),
+                        normals: half.map(|k| normals[k]),
+                    };
+                    draft.add(facet, meadow, 5);
+                }
             }
         }
     }
@@ -290,103 +289,6 @@ impl Line<'_> {
         }
     }
 
-    fn tunnel(&self, draft: &mut Draft, start: f32, seed: Seed) {
-        let stone = draft.material(Material::Wall {
-            kind: Wall::Stone,
-            colour: rgb(128, 122, 112) * seed.at(0).range(0.6, 1.1),
-        });
-        let dark = draft.material(Material::Plain { colour: Vec3::splat(0.006), gloss: 0.0 });
-        for piece in 0..(TUNNEL / 5.0) as i32 {
-            let y = start + (piece as f32 + 0.5) * 5.0;
-            let x = bend(y);
-            for (low, high) in [(-4.2, -3.4), (3.4, 4.2)] {
-                draft.add(
-                    Geometry::span(
-                        Vec3::new(x + low, y - 3.0, -1.0),
-                        Vec3::new(x + high, y + 3.0, 7.5),
-                    ),
-                    dark,
-                    0,
-                );
-            }
-            draft.add(
-                Geometry::span(Vec3::new(x - 4.0, y - 3.0, 6.4), Vec3::new(x + 4.0, y + 3.0, 7.5)),
-                dark,
-                0,
-            );
-        }
-        for (y, out) in [(start - 1.2, -1.0), (start + TUNNEL + 1.2, 1.0)] {
-            let x = bend(y);
-            for (low, high) in [
-                (Vec3::new(-9.0, 0.0, -2.0), Vec3::new(-3.2, 0.0, 9.5)),
-                (Vec3::new(3.2, 0.0, -2.0), Vec3::new(9.0, 0.0, 9.5)),
-                (Vec3::new(-3.2, 0.0, 6.2), Vec3::new(3.2, 0.0, 10.2)),
-            ] {
-                let at = Vec3::new(x, y, 0.0);
-                draft.add(
-                    Geometry::span(at + low - Vec3::Y * 0.6, at + high + Vec3::Y * 0.6),
-                    stone,
-                    seed.bits(),
-                );
-            }
-            // Deep inside nothing is seen: neither from outside nor from within.
-            let corner = Vec3::new(x - 3.4, y - out * 3.0, -1.0);
-            draft.add(Geometry::Patch { corner, u: Vec3::X * 6.8, v: Vec3::Z * 8.0 }, dark, 0);
-        }
-    }
-
-    fn station(
-        &self,
-        draft: &mut Draft,
-        kit: &StreetKit,
-        start: f32,
-        seed: Seed,
-        (people, traverse): (Seed, &Traverse),
-    ) {
-        let side = if seed.at(0).chance(0.5) { 1.0 } else { -1.0 };
-        let slab = draft.material(Material::Pavement { colour: rgb(160, 156, 148) });
-        let name = draft.material(Material::Sign {
-            ground: hue(seed.at(1).unit(), 0.7, 0.4),
-            ink: Vec3::splat(0.85),
-            lit: true,
-        });
-        let middle = bend(start + 0.5 * STATION);
-        for piece in 0..(STATION / 10.0) as i64 {
-            let y = start + piece as f32 * 10.0;
-            let edge = bend(y + 5.0) + side * 2.3;
-            let (a, b) = (edge, edge + side * 6.0);
-            draft.add(
-                Geometry::span(Vec3::new(a.min(b), y, -1.0), Vec3::new(a.max(b), y + 10.0, 0.75)),
-                slab,
-                seed.bits(),
-            );
-            if piece % 3 == 1 {
-                kit.lamp(
-                    draft,
-                    Vec3::new(edge + side * 4.0, y, 0.75),
-                    Vec2::new(-side * 1.2, 0.0),
-                    seed.at(20 + piece),
-                );
-                let panel = Vec3::new(edge + side * 4.4, y + 4.0, 2.9);
-                draft.add(Geometry::block(panel, Vec3::new(3.0, 0.1, 0.6), 0.0), name, seed.bits());
-            }
-            if people.at(piece).chance(0.7 * traverse.condition.traffic as f32) {
-                let at =
-                    Vec3::new(edge + side * people.at(50 + piece).range(1.0, 4.5), y + 3.0, 0.75);
-                kit.person(draft, at, people.at(80 + piece));
-            }
-        }
-        let front = middle + side * 9.5;
-        let lot = Lot {
-            front,
-            span: (start + 25.0, start + 25.0 + seed.at(2).range(16.0, 34.0)),
-            depth: 9.0,
-            side: -side,
-            level: 0.6,
-        };
-        house(draft, &lot, &Style::new(seed.named("style")), seed, seed.named("shop"));
-    }
-
     /// Lone houses with fields around them.
     fn farms(&self, draft: &mut Draft, beside: &impl Fn(f32) -> bool) {
         let seed = self.seed.named("farms");
@@ -410,4 +312,99 @@ impl Line<'_> {
             house(draft, &lot, &Style::new(own.named("style")), own, own.named("shop"));
         }
     }
+}
+
+fn tunnel(draft: &mut Draft, start: f32, seed: Seed) {
+    let stone = draft.material(Material::Wall {
+        kind: Wall::Stone,
+        colour: rgb(128, 122, 112) * seed.at(0).range(0.6, 1.1),
+    });
+    let dark = draft.material(Material::Plain { colour: Vec3::splat(0.006), gloss: 0.0 });
+    for piece in 0..(TUNNEL / 5.0) as i32 {
+        let y = start + (piece as f32 + 0.5) * 5.0;
+        let x = bend(y);
+        for (low, high) in [(-4.2, -3.4), (3.4, 4.2)] {
+            draft.add(
+                Geometry::span(
+                    Vec3::new(x + low, y - 3.0, -1.0),
+                    Vec3::new(x + high, y + 3.0, 7.5),
+                ),
+                dark,
+                0,
+            );
+        }
+        draft.add(
+            Geometry::span(Vec3::new(x - 4.0, y - 3.0, 6.4), Vec3::new(x + 4.0, y + 3.0, 7.5)),
+            dark,
+            0,
+        );
+    }
+    for (y, out) in [(start - 1.2, -1.0), (start + TUNNEL + 1.2, 1.0)] {
+        let x = bend(y);
+        for (low, high) in [
+            (Vec3::new(-9.0, 0.0, -2.0), Vec3::new(-3.2, 0.0, 9.5)),
+            (Vec3::new(3.2, 0.0, -2.0), Vec3::new(9.0, 0.0, 9.5)),
+            (Vec3::new(-3.2, 0.0, 6.2), Vec3::new(3.2, 0.0, 10.2)),
+        ] {
+            let at = Vec3::new(x, y, 0.0);
+            draft.add(
+                Geometry::span(at + low - Vec3::Y * 0.6, at + high + Vec3::Y * 0.6),
+                stone,
+                seed.bits(),
+            );
+        }
+        // Deep inside nothing is seen: neither from outside nor from within.
+        let corner = Vec3::new(x - 3.4, y - out * 3.0, -1.0);
+        draft.add(Geometry::Patch { corner, u: Vec3::X * 6.8, v: Vec3::Z * 8.0 }, dark, 0);
+    }
+}
+
+fn station(
+    draft: &mut Draft,
+    kit: &StreetKit,
+    start: f32,
+    seed: Seed,
+    (people, traverse): (Seed, &Traverse),
+) {
+    let side = if seed.at(0).chance(0.5) { 1.0 } else { -1.0 };
+    let slab = draft.material(Material::Pavement { colour: rgb(160, 156, 148) });
+    let name = draft.material(Material::Sign {
+        ground: hue(seed.at(1).unit(), 0.7, 0.4),
+        ink: Vec3::splat(0.85),
+        lit: true,
+    });
+    let middle = bend(start + 0.5 * STATION);
+    for piece in 0..(STATION / 10.0) as i64 {
+        let y = start + piece as f32 * 10.0;
+        let edge = bend(y + 5.0) + side * 2.3;
+        let (a, b) = (edge, edge + side * 6.0);
+        draft.add(
+            Geometry::span(Vec3::new(a.min(b), y, -1.0), Vec3::new(a.max(b), y + 10.0, 0.75)),
+            slab,
+            seed.bits(),
+        );
+        if piece % 3 == 1 {
+            kit.lamp(
+                draft,
+                Vec3::new(edge + side * 4.0, y, 0.75),
+                Vec2::new(-side * 1.2, 0.0),
+                seed.at(20 + piece),
+            );
+            let panel = Vec3::new(edge + side * 4.4, y + 4.0, 2.9);
+            draft.add(Geometry::block(panel, Vec3::new(3.0, 0.1, 0.6), 0.0), name, seed.bits());
+        }
+        if people.at(piece).chance(0.7 * traverse.condition.traffic as f32) {
+            let at = Vec3::new(edge + side * people.at(50 + piece).range(1.0, 4.5), y + 3.0, 0.75);
+            kit.person(draft, at, people.at(80 + piece));
+        }
+    }
+    let front = middle + side * 9.5;
+    let lot = Lot {
+        front,
+        span: (start + 25.0, start + 25.0 + seed.at(2).range(16.0, 34.0)),
+        depth: 9.0,
+        side: -side,
+        level: 0.6,
+    };
+    house(draft, &lot, &Style::new(seed.named("style")), seed, seed.named("shop"));
 }

@@ -13,7 +13,7 @@ use vpr_core::Error;
 use super::{Plan, Shot, looking_at};
 use crate::{
     light::Light,
-    parts::{Furnisher, Room},
+    parts::{Furnisher, Room, shell},
     recipe::{Recipe, Refusal, Traverse},
     scene::{Draft, Scene},
     seed::Seed,
@@ -77,8 +77,8 @@ impl SevenScenes {
         };
         let (train, test) = (within(&train), within(&test));
         let scenes = vec![
-            self.build(&train, &test, &recipe.references, seed, 0),
-            self.build(&train, &test, &recipe.queries, seed, 1),
+            build(&train, &test, &recipe.references, seed, 0),
+            build(&train, &test, &recipe.queries, seed, 1),
         ];
         let lights = vec![
             Light::indoors(&recipe.references.condition, seed.named("first light")),
@@ -93,61 +93,59 @@ impl SevenScenes {
             world_from_scene: scene_from_world.inverse(),
         })
     }
+}
 
-    /// A room around all cameras, with 1.6 m between them and the walls.
-    fn build(
-        &self,
-        train: &[vpr_core::Pose],
-        test: &[vpr_core::Pose],
-        traverse: &Traverse,
-        seed: Seed,
-        number: i64,
-    ) -> Scene {
-        let centers: Vec<Vec3> = train
-            .iter()
-            .chain(test)
-            .map(|pose| pose.translation.vector)
-            .map(|at| Vec3::new(at.x as f32, at.y as f32, at.z as f32))
-            .collect();
-        let low = centers.iter().fold(Vec3::INFINITY, |low, &at| low.min(at));
-        let high = centers.iter().fold(Vec3::NEG_INFINITY, |high, &at| high.max(at));
-        let room =
-            Room { low: low - Vec3::new(1.6, 1.6, 1.2), high: high + Vec3::new(1.6, 1.6, 1.1) };
-        let mut draft = Draft::default();
-        let furnisher = Furnisher::new(&mut draft, seed.named("furnisher"));
-        furnisher.shell(&mut draft, &room, seed.named("shell"));
-        let changed = traverse.condition.changed as f32;
-        furnisher.furnish(
-            &mut draft,
-            &room,
-            0.08,
-            seed.named("things"),
-            (seed.named("visit").at(number), changed),
+/// A room around all cameras, with 1.6 m between them and the walls.
+fn build(
+    train: &[vpr_core::Pose],
+    test: &[vpr_core::Pose],
+    traverse: &Traverse,
+    seed: Seed,
+    number: i64,
+) -> Scene {
+    let centers: Vec<Vec3> = train
+        .iter()
+        .chain(test)
+        .map(|pose| pose.translation.vector)
+        .map(|at| Vec3::new(at.x as f32, at.y as f32, at.z as f32))
+        .collect();
+    let low = centers.iter().fold(Vec3::INFINITY, |low, &at| low.min(at));
+    let high = centers.iter().fold(Vec3::NEG_INFINITY, |high, &at| high.max(at));
+    let room = Room { low: low - Vec3::new(1.6, 1.6, 1.2), high: high + Vec3::new(1.6, 1.6, 1.1) };
+    let mut draft = Draft::default();
+    let furnisher = Furnisher::new(&mut draft, seed.named("furnisher"));
+    shell(&mut draft, &room, seed.named("shell"));
+    let changed = traverse.condition.changed as f32;
+    furnisher.furnish(
+        &mut draft,
+        &room,
+        0.08,
+        seed.named("things"),
+        (seed.named("visit").at(number), changed),
+    );
+    let lit = 1.0 - 0.67 * traverse.condition.darkness as f32;
+    furnisher.lights(&mut draft, &room, 2.6, lit, seed.named("lamps"));
+    // Tables where no camera passes.
+    for table in 0..12 {
+        let own = seed.named("table").at(table);
+        let at = Vec3::new(
+            own.at(0).range(room.low.x + 0.9, room.high.x - 0.9),
+            own.at(1).range(room.low.y + 0.9, room.high.y - 0.9),
+            room.low.z,
         );
-        let lit = 1.0 - 0.67 * traverse.condition.darkness as f32;
-        furnisher.lights(&mut draft, &room, 2.6, lit, seed.named("lamps"));
-        // Tables where no camera passes.
-        for table in 0..12 {
-            let own = seed.named("table").at(table);
-            let at = Vec3::new(
-                own.at(0).range(room.low.x + 0.9, room.high.x - 0.9),
-                own.at(1).range(room.low.y + 0.9, room.high.y - 0.9),
-                room.low.z,
+        let free = centers
+            .iter()
+            .all(|center| Vec2::new(center.x - at.x, center.y - at.y).length() > 0.75);
+        if free {
+            furnisher.table(
+                &mut draft,
+                at,
+                Vec2::new(own.at(2).range(0.5, 1.0), own.at(3).range(0.4, 0.8)),
+                own,
             );
-            let free = centers
-                .iter()
-                .all(|center| Vec2::new(center.x - at.x, center.y - at.y).length() > 0.75);
-            if free {
-                furnisher.table(
-                    &mut draft,
-                    at,
-                    Vec2::new(own.at(2).range(0.5, 1.0), own.at(3).range(0.4, 0.8)),
-                    own,
-                );
-            }
         }
-        Scene::new(draft)
     }
+    Scene::new(draft)
 }
 
 fn shots(
@@ -210,10 +208,10 @@ fn hand_held(n: usize, seed: Seed) -> Vec<vpr_core::Pose> {
         let own = seed.at(key);
         (0..3_u8)
             .map(|wave| {
-                let wave_seed = own.at(i64::from(wave));
-                let speed = f64::from(wave_seed.at(0).range(0.6, 1.6)) * f64::from(1 + wave);
-                let phase = f64::from(wave_seed.at(1).range(0.0, 6.28));
-                libm::sin(t * speed + phase) / f64::from(1 + wave)
+                let draw = own.at(i64::from(wave));
+                let rate = f64::from(draw.at(0).range(0.6, 1.6)) * f64::from(1 + wave);
+                let phase = f64::from(draw.at(1).range(0.0, std::f32::consts::TAU));
+                libm::sin(t * rate + phase) / f64::from(1 + wave)
             })
             .sum::<f64>()
     };

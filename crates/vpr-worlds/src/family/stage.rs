@@ -8,8 +8,8 @@ use super::{Plan, Shot, Street, beside, looking_at};
 use crate::{
     geometry::Ray,
     light::Light,
-    parts::{Furnisher, Room, toy_town},
-    recipe::{Offset, Recipe, Refusal},
+    parts::{Furnisher, Room, shell, toy_town},
+    recipe::{Offset, Recipe},
     scene::{Draft, Lamp, Scene},
     seed::Seed,
 };
@@ -71,16 +71,7 @@ const ARCS: [(f64, f64, usize); 3] = [(40.0, 0.5, 49), (25.0, 0.65, 31), (20.0, 
 const BETWEEN: usize = 14;
 
 impl Stage {
-    #[expect(
-        clippy::unused_self,
-        clippy::unnecessary_wraps,
-        reason = "all families are checked alike"
-    )]
-    pub(crate) fn check(&self) -> Result<(), Refusal> {
-        Ok(())
-    }
-
-    pub(crate) fn plan(&self, recipe: &Recipe, seed: Seed) -> Plan {
+    pub(crate) fn plan(self, recipe: &Recipe, seed: Seed) -> Plan {
         match self.kind {
             StageKind::LightStageViewpoints => {
                 light_stage(recipe, seed, &viewpoints(), &LIGHTS_DEG[4..5])
@@ -208,7 +199,7 @@ fn multi_illumination(recipe: &Recipe, seed: Seed) -> Plan {
             let own = seed.named("room").at(number);
             let mut draft = Draft::default();
             let furnisher = Furnisher::new(&mut draft, own.named("furnisher"));
-            furnisher.shell(&mut draft, &room, own);
+            shell(&mut draft, &room, own);
             furnisher.furnish(&mut draft, &room, 0.1, own.named("things"), (own, 0.0));
             furnisher.table(
                 &mut draft,

@@ -88,17 +88,15 @@ pub(crate) fn image_path(layout: Layout, side: Side, index: usize, shot: &Shot) 
 /// The depth image that belongs to an image.
 pub(crate) fn depth_path(layout: Layout, side: Side, image: &Path) -> PathBuf {
     let name = image.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    match layout {
-        Layout::SevenScenes => image.with_file_name(name.replace(".color.", ".depth.")),
-        _ => {
-            let folder = match side {
-                Side::References => "depth/ref",
-                Side::Queries => "depth/query",
-                Side::Grid => "depth/grid",
-            };
-            Path::new(folder).join(name).with_extension("png")
-        }
+    if layout == Layout::SevenScenes {
+        return image.with_file_name(name.replace(".color.", ".depth."));
     }
+    let folder = match side {
+        Side::References => "depth/ref",
+        Side::Queries => "depth/query",
+        Side::Grid => "depth/grid",
+    };
+    Path::new(folder).join(name).with_extension("png")
 }
 
 /// Metres per unit of a depth image: 7-Scenes counts millimetres, which end at 65 m.
@@ -133,10 +131,10 @@ pub(crate) fn side_files(
         if recipe.layout == Layout::SevenScenes {
             match side {
                 Side::References => {
-                    files.push((PathBuf::from("TrainSplit.txt"), b"sequence1\n".to_vec()))
+                    files.push((PathBuf::from("TrainSplit.txt"), b"sequence1\n".to_vec()));
                 }
                 Side::Queries => {
-                    files.push((PathBuf::from("TestSplit.txt"), b"sequence2\n".to_vec()))
+                    files.push((PathBuf::from("TestSplit.txt"), b"sequence2\n".to_vec()));
                 }
                 Side::Grid => {}
             }
@@ -168,7 +166,7 @@ fn pose_table(layout: Layout, side: Side, plan: &Plan) -> Vec<u8> {
         let pose = plan.world_from_scene * shot.pose;
         let (t, q) = (pose.translation.vector, pose.rotation);
         let values = [t.x, t.y, t.z, q.w, q.i, q.j, q.k].map(|value| format!("{value:.9}"));
-        text.push_str(&format!("{name},{}\n", values.join(",")));
+        text.extend([name.as_str(), ",", &values.join(","), "\n"]);
     }
     text.into_bytes()
 }

@@ -188,7 +188,7 @@ impl Facade {
         if bar(within.x, columns, size.x) < 0.035 || bar(within.y, rows, size.y) < 0.04 {
             return Paint::matt(self.frame);
         }
-        let lit = self.lit(own, place.season);
+        let lit = Self::lit(own, place.season);
         let blind = unit(mix(own ^ 1)) * 0.8;
         let drawn = unit(mix(own ^ 2)) < 0.45 && 1.0 - within.y < blind;
         let gathered =
@@ -200,7 +200,7 @@ impl Facade {
     }
 
     /// Light in a room: warm, in a third of the rooms, other rooms every evening.
-    fn lit(&self, own: u32, season: &Season) -> Vec3 {
+    fn lit(own: u32, season: &Season) -> Vec3 {
         let on = unit(mix(own ^ season.evening)) < 0.33;
         let strength = lerp(0.25, 0.9, unit(mix(own ^ 8))) * step(0.35, 0.75, season.night);
         if on { Vec3::new(1.0, 0.78, 0.48) * strength } else { Vec3::ZERO }
@@ -255,7 +255,7 @@ impl Facade {
                 let own = mix(*seed ^ 0xd1);
                 return Paint {
                     sunk,
-                    glow: self.lit(own, place.season),
+                    glow: Self::lit(own, place.season),
                     ..Paint::glossy(Vec3::splat(0.04), 0.3)
                 };
             }

@@ -27,7 +27,7 @@ pub(crate) enum Wall {
 pub(crate) fn wall(kind: Wall, colour: Colour, touch: &Touch) -> Paint {
     let at = touch.spot.uv;
     let stain = cloudy(touch.seed, at * Vec2::new(0.55, 0.3), 4, 0.5 * touch.footprint);
-    let streak = cloudy(touch.seed ^ 77, at * Vec2::new(2.2, 0.12), 2, 2.2 * touch.footprint);
+    let streak = cloudy(touch.seed ^ 0x4d, at * Vec2::new(2.2, 0.12), 2, 2.2 * touch.footprint);
     let damp = 1.0 - 0.3 * step(1.2, 0.0, at.y) * streak;
     let aged = colour * lerp(0.78, 1.14, 0.6 * stain + 0.4 * streak) * damp;
     let tone = match kind {

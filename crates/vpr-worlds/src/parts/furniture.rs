@@ -52,6 +52,59 @@ impl Niche {
     }
 }
 
+/// Floor, ceiling and four walls.
+pub(crate) fn shell(draft: &mut Draft, room: &Room, seed: Seed) {
+    let Room { low, high } = *room;
+    let tone = hue(seed.at(0).unit(), seed.at(1).range(0.03, 0.25), seed.at(2).range(0.7, 0.95));
+    let kind = seed.at(3).pick(&[
+        Wall::Plaster,
+        Wall::Plaster,
+        Wall::Plaster,
+        Wall::Brick,
+        Wall::Concrete,
+    ]);
+    let wall = draft.material(Material::Wall { kind, colour: tone });
+    let floor = draft.material(match seed.at(4).index(4) {
+        0 => Material::Checks {
+            first: rgb(190, 186, 176),
+            second: rgb(150, 140, 128),
+            size: seed.at(5).range(0.25, 0.6),
+        },
+        1 => Material::Boards { colour: rgb(150, 104, 64), width: 0.14 },
+        2 => Material::Cloth {
+            colour: hue(seed.at(6).unit(), 0.4, 0.4),
+            other: hue(seed.at(6).unit(), 0.35, 0.5),
+            size: 0.5,
+        },
+        _ => Material::Checks { first: rgb(120, 122, 124), second: rgb(114, 118, 120), size: 0.5 },
+    });
+    let ceiling = draft.material(Material::Checks {
+        first: rgb(222, 222, 218),
+        second: rgb(220, 220, 216),
+        size: 0.6,
+    });
+    let size = high - low;
+    let flat = |z: f32| Vec3::new(low.x, low.y, z);
+    draft.add(
+        Geometry::Patch { corner: flat(low.z), u: Vec3::X * size.x, v: Vec3::Y * size.y },
+        floor,
+        seed.bits(),
+    );
+    draft.add(
+        Geometry::Patch { corner: flat(high.z), u: Vec3::X * size.x, v: Vec3::Y * size.y },
+        ceiling,
+        seed.bits(),
+    );
+    for (corner, u) in [
+        (low, Vec3::X * size.x),
+        (low, Vec3::Y * size.y),
+        (Vec3::new(low.x, high.y, low.z), Vec3::X * size.x),
+        (Vec3::new(high.x, low.y, low.z), Vec3::Y * size.y),
+    ] {
+        draft.add(Geometry::Patch { corner, u, v: Vec3::Z * size.z }, wall, seed.bits());
+    }
+}
+
 impl Furnisher {
     pub(crate) fn new(draft: &mut Draft, seed: Seed) -> Self {
         let wood = [rgb(166, 120, 78), rgb(110, 74, 48), rgb(206, 178, 140)]
@@ -86,64 +139,6 @@ impl Furnisher {
                 lit: false,
             }),
             white: draft.material(Material::Plain { colour: rgb(225, 224, 220), gloss: 0.05 }),
-        }
-    }
-
-    /// Floor, ceiling and four walls.
-    pub(crate) fn shell(&self, draft: &mut Draft, room: &Room, seed: Seed) {
-        let Room { low, high } = *room;
-        let tone =
-            hue(seed.at(0).unit(), seed.at(1).range(0.03, 0.25), seed.at(2).range(0.7, 0.95));
-        let kind = seed.at(3).pick(&[
-            Wall::Plaster,
-            Wall::Plaster,
-            Wall::Plaster,
-            Wall::Brick,
-            Wall::Concrete,
-        ]);
-        let wall = draft.material(Material::Wall { kind, colour: tone });
-        let floor = draft.material(match seed.at(4).index(4) {
-            0 => Material::Checks {
-                first: rgb(190, 186, 176),
-                second: rgb(150, 140, 128),
-                size: seed.at(5).range(0.25, 0.6),
-            },
-            1 => Material::Boards { colour: rgb(150, 104, 64), width: 0.14 },
-            2 => Material::Cloth {
-                colour: hue(seed.at(6).unit(), 0.4, 0.4),
-                other: hue(seed.at(6).unit(), 0.35, 0.5),
-                size: 0.5,
-            },
-            _ => Material::Checks {
-                first: rgb(120, 122, 124),
-                second: rgb(114, 118, 120),
-                size: 0.5,
-            },
-        });
-        let ceiling = draft.material(Material::Checks {
-            first: rgb(222, 222, 218),
-            second: rgb(220, 220, 216),
-            size: 0.6,
-        });
-        let size = high - low;
-        let flat = |z: f32| Vec3::new(low.x, low.y, z);
-        draft.add(
-            Geometry::Patch { corner: flat(low.z), u: Vec3::X * size.x, v: Vec3::Y * size.y },
-            floor,
-            seed.bits(),
-        );
-        draft.add(
-            Geometry::Patch { corner: flat(high.z), u: Vec3::X * size.x, v: Vec3::Y * size.y },
-            ceiling,
-            seed.bits(),
-        );
-        for (corner, u) in [
-            (low, Vec3::X * size.x),
-            (low, Vec3::Y * size.y),
-            (Vec3::new(low.x, high.y, low.z), Vec3::X * size.x),
-            (Vec3::new(high.x, low.y, low.z), Vec3::Y * size.y),
-        ] {
-            draft.add(Geometry::Patch { corner, u, v: Vec3::Z * size.z }, wall, seed.bits());
         }
     }
 
@@ -242,72 +237,63 @@ impl Furnisher {
                 bits,
             ),
             2 => self.desk(draft, niche, (wide, wood, plain), seed),
-            3 => {
-                let z = seed.at(4).range(0.8, 1.0);
-                draft.add(
-                    niche.block(0.0, (0.0, 0.03), wide, (z, z + seed.at(5).range(1.0, 1.4))),
-                    self.outlook,
-                    bits,
-                );
-                draft.add(
-                    niche.block(0.0, (0.0, 0.2), wide + 0.1, (z - 0.05, z)),
-                    self.white,
-                    bits,
-                );
-                draft.add(
-                    niche.block(0.0, (0.02, 0.14), wide * 0.9, (0.15, 0.7)),
-                    self.white,
-                    bits,
-                );
-            }
-            4 => {
-                draft.add(niche.block(0.0, (0.1, 0.9), wide, (0.12, 0.42)), plain, bits);
-                draft.add(niche.block(0.0, (0.02, 0.25), wide, (0.4, 0.85)), plain, bits);
-                for end in [-0.5, 0.5] {
-                    draft.add(niche.block(end * wide, (0.05, 0.9), 0.18, (0.1, 0.6)), plain, bits);
-                }
-                self.hang(draft, niche, seed.named("above"));
-            }
+            3 => self.window(draft, niche, wide, seed),
+            4 => self.sofa(draft, niche, (wide, plain), seed),
             5 => {
                 let high = seed.at(4).range(0.8, 1.9);
                 draft.add(niche.block(0.0, (0.0, 0.5), wide * 0.7, (0.0, high)), plain, bits);
                 let handle = niche.block(0.12, (0.5, 0.53), 0.03, (high * 0.5, high * 0.5 + 0.2));
                 draft.add(handle, self.metal, bits);
             }
-            6 => {
-                let pot = niche.foot + niche.inward * 0.4;
-                draft.add(
-                    Geometry::Pillar { base: pot, height: 0.4, bottom: 0.16, top: 0.22 },
-                    plain,
-                    bits,
-                );
-                for part in 0..4 {
-                    let own = seed.at(20 + part);
-                    let center = pot
-                        + Vec3::new(
-                            own.at(0).range(-0.15, 0.15),
-                            own.at(1).range(-0.15, 0.15),
-                            own.at(2).range(0.6, 1.3),
-                        );
-                    let radii = Vec3::splat(own.at(3).range(0.15, 0.32));
-                    draft.add(
-                        Geometry::Ellipsoid {
-                            center,
-                            radii,
-                            holes: 0.45,
-                            grain: 0.07,
-                            seed: own.bits(),
-                        },
-                        self.leaves,
-                        own.bits(),
-                    );
-                }
-            }
+            6 => self.pot_plant(draft, niche, plain, seed),
             7 => {
                 draft.add(niche.block(0.0, (0.0, 0.03), wide * 0.5, (1.3, 1.6)), self.sign, bits);
                 self.hang(draft, niche, seed.named("beside"));
             }
             _ => self.hang(draft, niche, seed),
+        }
+    }
+
+    /// A window to the outside with its sill, a radiator below it.
+    fn window(&self, draft: &mut Draft, niche: &Niche, wide: f32, seed: Seed) {
+        let bits = seed.bits();
+        let z = seed.at(4).range(0.8, 1.0);
+        let pane = niche.block(0.0, (0.0, 0.03), wide, (z, z + seed.at(5).range(1.0, 1.4)));
+        draft.add(pane, self.outlook, bits);
+        draft.add(niche.block(0.0, (0.0, 0.2), wide + 0.1, (z - 0.05, z)), self.white, bits);
+        draft.add(niche.block(0.0, (0.02, 0.14), wide * 0.9, (0.15, 0.7)), self.white, bits);
+    }
+
+    /// A sofa below a picture.
+    fn sofa(&self, draft: &mut Draft, niche: &Niche, (wide, plain): (f32, u32), seed: Seed) {
+        let bits = seed.bits();
+        draft.add(niche.block(0.0, (0.1, 0.9), wide, (0.12, 0.42)), plain, bits);
+        draft.add(niche.block(0.0, (0.02, 0.25), wide, (0.4, 0.85)), plain, bits);
+        for end in [-0.5, 0.5] {
+            draft.add(niche.block(end * wide, (0.05, 0.9), 0.18, (0.1, 0.6)), plain, bits);
+        }
+        self.hang(draft, niche, seed.named("above"));
+    }
+
+    fn pot_plant(&self, draft: &mut Draft, niche: &Niche, plain: u32, seed: Seed) {
+        let base = niche.foot + niche.inward * 0.4;
+        let pot = Geometry::Pillar { base, height: 0.4, bottom: 0.16, top: 0.22 };
+        draft.add(pot, plain, seed.bits());
+        for part in 0..4 {
+            let own = seed.at(20 + part);
+            let shift = Vec3::new(
+                own.at(0).range(-0.15, 0.15),
+                own.at(1).range(-0.15, 0.15),
+                own.at(2).range(0.6, 1.3),
+            );
+            let crown = Geometry::Ellipsoid {
+                center: base + shift,
+                radii: Vec3::splat(own.at(3).range(0.15, 0.32)),
+                holes: 0.45,
+                grain: 0.07,
+                seed: own.bits(),
+            };
+            draft.add(crown, self.leaves, own.bits());
         }
     }
 

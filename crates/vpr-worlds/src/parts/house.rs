@@ -80,19 +80,8 @@ impl Style {
             Wall::Concrete,
             Wall::Clapboard,
         ]);
-        let tall = seed.at(1).chance(0.5);
-        let share = if tall { seed.at(2).range(0.32, 0.5) } else { seed.at(2).range(0.45, 0.78) };
         let floor = seed.at(3).range(2.8, 3.7);
-        let sill = if tall { seed.at(4).range(0.3, 0.7) } else { seed.at(4).range(0.8, 1.0) };
-        let opening = Opening {
-            share,
-            sill,
-            height: floor - sill - seed.at(5).range(0.45, 0.8),
-            arched: wall != Wall::Concrete && seed.at(6).chance(0.18),
-            panes: seed.at(7).pick(&[(1, 1), (2, 1), (2, 2), (2, 3), (3, 2), (1, 2)]),
-            shutters: seed.at(8).chance(0.25).then(|| hue(seed.at(9).unit(), 0.5, 0.45)),
-            inset: seed.at(10).range(0.08, 0.28),
-        };
+        let opening = opening(wall, floor, seed);
         let trim = if seed.at(11).chance(0.7) {
             rgb(214, 206, 190)
         } else {
@@ -136,6 +125,22 @@ impl Style {
     }
 }
 
+/// The windows of a kind of house.
+fn opening(wall: Wall, floor: f32, seed: Seed) -> Opening {
+    let tall = seed.at(1).chance(0.5);
+    let share = if tall { seed.at(2).range(0.32, 0.5) } else { seed.at(2).range(0.45, 0.78) };
+    let sill = if tall { seed.at(4).range(0.3, 0.7) } else { seed.at(4).range(0.8, 1.0) };
+    Opening {
+        share,
+        sill,
+        height: floor - sill - seed.at(5).range(0.45, 0.8),
+        arched: wall != Wall::Concrete && seed.at(6).chance(0.18),
+        panes: seed.at(7).pick(&[(1, 1), (2, 1), (2, 2), (2, 3), (3, 2), (1, 2)]),
+        shutters: seed.at(8).chance(0.25).then(|| hue(seed.at(9).unit(), 0.5, 0.45)),
+        inset: seed.at(10).range(0.08, 0.28),
+    }
+}
+
 fn wall_colour(wall: Wall, seed: Seed) -> Colour {
     match wall {
         Wall::Brick => seed.at(0).pick(&[
@@ -161,7 +166,7 @@ fn wall_colour(wall: Wall, seed: Seed) -> Colour {
 /// Builds one house; `look` decides everything that lasts, `shop` who keeps shop at the moment.
 pub(crate) fn house(draft: &mut Draft, lot: &Lot, style: &Style, look: Seed, shop: Seed) {
     let mut facade = style.facade.clone();
-    facade.face = if lot.side > 0.0 { 0 } else { 1 };
+    facade.face = u8::from(lot.side <= 0.0);
     facade.colour = (facade.colour * look.at(0).range(0.8, 1.2))
         .lerp(wall_colour(facade.wall, look.at(1)), 0.45);
     facade.bay *= look.at(2).range(0.85, 1.2);
@@ -269,69 +274,12 @@ fn roof(draft: &mut Draft, lot: &Lot, style: &Style, facade: &Facade, eaves: f32
         size: 0.32,
     });
     let gable = draft.material(Material::Wall { kind: facade.wall, colour: facade.colour });
-    let (w, d) = (lot.width(), lot.depth);
     let rise = look.at(41).range(0.35, 0.65);
-    let corner = |out: f32, along: f32, z: f32| lot.at(out, along, eaves + z);
-    let mut slope = |a: Vec3, b: Vec3, c: Vec3, d: Option<Vec3>, material: u32| {
-        // As seen from outside the corners run a, b, c(, d) around the slope.
-        draft.add(Geometry::triangle(a, b, c), material, look.at(42).bits());
-        if let Some(d) = d {
-            draft.add(Geometry::triangle(a, c, d), material, look.at(42).bits());
-        }
-    };
+    let mut slopes = Slopes { draft, lot, eaves, tiles, gable, seed: look.at(42).bits() };
     let top = match style.roof {
-        Roof::Saddle => {
-            let z = rise * 0.5 * d;
-            let ridge = (corner(-0.5 * d, 0.0, z), corner(-0.5 * d, w, z));
-            slope(corner(0.3, 0.0, -0.2), corner(0.3, w, -0.2), ridge.1, Some(ridge.0), tiles);
-            slope(
-                corner(-d - 0.3, 0.0, -0.2),
-                corner(-d - 0.3, w, -0.2),
-                ridge.1,
-                Some(ridge.0),
-                tiles,
-            );
-            slope(corner(0.0, 0.0, 0.0), corner(-d, 0.0, 0.0), ridge.0, None, gable);
-            slope(corner(0.0, w, 0.0), corner(-d, w, 0.0), ridge.1, None, gable);
-            z
-        }
-        Roof::Gable => {
-            let z = (rise + 0.25) * 0.5 * w;
-            let ridge = (corner(0.0, 0.5 * w, z), corner(-d, 0.5 * w, z));
-            slope(
-                corner(0.2, 0.0, -0.1),
-                corner(-d, 0.0, -0.1),
-                ridge.1,
-                Some(corner(0.2, 0.5 * w, z)),
-                tiles,
-            );
-            slope(
-                corner(0.2, w, -0.1),
-                corner(-d, w, -0.1),
-                ridge.1,
-                Some(corner(0.2, 0.5 * w, z)),
-                tiles,
-            );
-            slope(corner(0.0, 0.0, 0.0), corner(0.0, w, 0.0), ridge.0, None, gable);
-            slope(corner(-d, 0.0, 0.0), corner(-d, w, 0.0), ridge.1, None, gable);
-            z
-        }
-        Roof::Hip => {
-            let z = rise * 0.5 * d.min(w);
-            let inset = 0.5 * d.min(w);
-            let ridge = (corner(-0.5 * d, inset, z), corner(-0.5 * d, w - inset, z));
-            slope(
-                corner(0.3, -0.2, -0.1),
-                corner(0.3, w + 0.2, -0.1),
-                ridge.1,
-                Some(ridge.0),
-                tiles,
-            );
-            slope(corner(-d, 0.0, 0.0), corner(-d, w, 0.0), ridge.1, Some(ridge.0), tiles);
-            slope(corner(0.0, 0.0, 0.0), corner(-d, 0.0, 0.0), ridge.0, None, tiles);
-            slope(corner(0.0, w, 0.0), corner(-d, w, 0.0), ridge.1, None, tiles);
-            z
-        }
+        Roof::Saddle => slopes.saddle(rise),
+        Roof::Gable => slopes.gable(rise + 0.25),
+        Roof::Hip => slopes.hip(rise),
         Roof::Flat => {
             let parapet = lot.block(0.0, 0.3, eaves, eaves + 0.5, 0.0);
             draft.add(parapet, gable, look.at(43).bits());
@@ -339,6 +287,83 @@ fn roof(draft: &mut Draft, lot: &Lot, style: &Style, facade: &Facade, eaves: f32
         }
     };
     chimneys(draft, lot, eaves, top, gable, look);
+}
+
+/// The surfaces of a roof in the making; all give the height of the ridge above the eaves.
+struct Slopes<'a> {
+    draft: &'a mut Draft,
+    lot: &'a Lot,
+    eaves: f32,
+    tiles: u32,
+    gable: u32,
+    seed: u32,
+}
+
+impl Slopes<'_> {
+    /// A point before the front, along it, and above the eaves.
+    fn corner(&self, out: f32, along: f32, z: f32) -> Vec3 {
+        self.lot.at(out, along, self.eaves + z)
+    }
+
+    /// A triangle whose corners run around it as seen from outside.
+    fn three(&mut self, corners: [Vec3; 3], material: u32) {
+        let [first, second, third] = corners;
+        self.draft.add(Geometry::triangle(first, second, third), material, self.seed);
+    }
+
+    /// Four corners likewise, tiled.
+    fn four(&mut self, corners: [Vec3; 4]) {
+        let [first, second, third, fourth] = corners;
+        self.three([first, second, third], self.tiles);
+        self.three([first, third, fourth], self.tiles);
+    }
+
+    fn saddle(&mut self, rise: f32) -> f32 {
+        let (w, d) = (self.lot.width(), self.lot.depth);
+        let z = rise * 0.5 * d;
+        let ridge = [self.corner(-0.5 * d, 0.0, z), self.corner(-0.5 * d, w, z)];
+        for out in [0.3, -d - 0.3] {
+            let eave = [self.corner(out, 0.0, -0.2), self.corner(out, w, -0.2)];
+            self.four([eave[0], eave[1], ridge[1], ridge[0]]);
+        }
+        for (along, peak) in [(0.0, ridge[0]), (w, ridge[1])] {
+            let foot = [self.corner(0.0, along, 0.0), self.corner(-d, along, 0.0)];
+            self.three([foot[0], foot[1], peak], self.gable);
+        }
+        z
+    }
+
+    fn gable(&mut self, rise: f32) -> f32 {
+        let (w, d) = (self.lot.width(), self.lot.depth);
+        let z = rise * 0.5 * w;
+        let ridge = [self.corner(0.0, 0.5 * w, z), self.corner(-d, 0.5 * w, z)];
+        let peak = self.corner(0.2, 0.5 * w, z);
+        for along in [0.0, w] {
+            let eave = [self.corner(0.2, along, -0.1), self.corner(-d, along, -0.1)];
+            self.four([eave[0], eave[1], ridge[1], peak]);
+        }
+        for (out, peak) in [(0.0, ridge[0]), (-d, ridge[1])] {
+            let foot = [self.corner(out, 0.0, 0.0), self.corner(out, w, 0.0)];
+            self.three([foot[0], foot[1], peak], self.gable);
+        }
+        z
+    }
+
+    fn hip(&mut self, rise: f32) -> f32 {
+        let (w, d) = (self.lot.width(), self.lot.depth);
+        let z = rise * 0.5 * d.min(w);
+        let inset = 0.5 * d.min(w);
+        let ridge = [self.corner(-0.5 * d, inset, z), self.corner(-0.5 * d, w - inset, z)];
+        let front = [self.corner(0.3, -0.2, -0.1), self.corner(0.3, w + 0.2, -0.1)];
+        self.four([front[0], front[1], ridge[1], ridge[0]]);
+        let back = [self.corner(-d, 0.0, 0.0), self.corner(-d, w, 0.0)];
+        self.four([back[0], back[1], ridge[1], ridge[0]]);
+        for (along, peak) in [(0.0, ridge[0]), (w, ridge[1])] {
+            let foot = [self.corner(0.0, along, 0.0), self.corner(-d, along, 0.0)];
+            self.three([foot[0], foot[1], peak], self.tiles);
+        }
+        z
+    }
 }
 
 fn chimneys(draft: &mut Draft, lot: &Lot, eaves: f32, top: f32, wall: u32, look: Seed) {

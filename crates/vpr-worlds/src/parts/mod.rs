@@ -6,7 +6,7 @@ mod street_things;
 mod toys;
 mod tree;
 
-pub(crate) use furniture::{Furnisher, Room};
+pub(crate) use furniture::{Furnisher, Room, shell};
 pub(crate) use house::{Lot, Style, house};
 pub(crate) use street_things::{StreetKit, hide_behind};
 pub(crate) use toys::toy_town;

@@ -175,7 +175,7 @@ impl StreetKit {
     /// Somebody standing or walking.
     pub(crate) fn person(&self, draft: &mut Draft, foot: Vec3, seed: Seed) {
         let mut parts = Vec::new();
-        let angle = seed.at(9).range(0.0, 6.28);
+        let angle = seed.at(9).range(0.0, std::f32::consts::TAU);
         self.body(&mut parts, foot, Vec2::new(libm::cosf(angle), libm::sinf(angle)), seed);
         draft.shapes.extend(parts);
     }

@@ -41,46 +41,43 @@ pub(crate) fn toy_town(draft: &mut Draft, reach: f32, seed: Seed) {
             match own.at(2).index(5) {
                 0 | 1 => toy_house(draft, at, cell, dark, own),
                 2 => toy_car(draft, at, dark, own),
-                3 => {
-                    let stem =
-                        Geometry::Pillar { base: at, height: 0.05, bottom: 0.006, top: 0.005 };
-                    draft.add(stem, backdrop, 0);
-                    for ball in 0..3 {
-                        let part = own.at(20 + ball);
-                        let shift = Vec3::new(
-                            part.at(0).range(-0.015, 0.015),
-                            part.at(1).range(-0.015, 0.015),
-                            part.at(2).range(0.045, 0.085),
-                        );
-                        let radii = Vec3::splat(part.at(3).range(0.018, 0.03));
-                        let crown = Geometry::Ellipsoid {
-                            center: at + shift,
-                            radii,
-                            holes: 0.35,
-                            grain: 0.008,
-                            seed: part.bits(),
-                        };
-                        draft.add(crown, leaves, part.bits());
-                    }
-                }
-                _ => {
-                    let colour = hue(own.at(30).unit(), 0.7, 0.7);
-                    let plain = draft.material(Material::Plain { colour, gloss: 0.1 });
-                    let r = own.at(31).range(0.012, 0.026);
-                    draft.add(
-                        Geometry::Pillar { base: at, height: 3.0 * r, bottom: r, top: 0.5 * r },
-                        plain,
-                        own.bits(),
-                    );
-                    draft.add(
-                        Geometry::ball(at + Vec3::Z * (3.4 * r), Vec3::splat(0.6 * r)),
-                        plain,
-                        own.bits(),
-                    );
-                }
+                3 => toy_tree(draft, at, (backdrop, leaves), own),
+                _ => toy_figure(draft, at, own),
             }
         }
     }
+}
+
+fn toy_tree(draft: &mut Draft, at: Vec3, (bark, leaves): (u32, u32), seed: Seed) {
+    let stem = Geometry::Pillar { base: at, height: 0.05, bottom: 0.006, top: 0.005 };
+    draft.add(stem, bark, 0);
+    for ball in 0..3 {
+        let part = seed.at(20 + ball);
+        let shift = Vec3::new(
+            part.at(0).range(-0.015, 0.015),
+            part.at(1).range(-0.015, 0.015),
+            part.at(2).range(0.045, 0.085),
+        );
+        let crown = Geometry::Ellipsoid {
+            center: at + shift,
+            radii: Vec3::splat(part.at(3).range(0.018, 0.03)),
+            holes: 0.35,
+            grain: 0.008,
+            seed: part.bits(),
+        };
+        draft.add(crown, leaves, part.bits());
+    }
+}
+
+/// A wooden figure: a cone with a ball on it.
+fn toy_figure(draft: &mut Draft, at: Vec3, seed: Seed) {
+    let colour = hue(seed.at(30).unit(), 0.7, 0.7);
+    let plain = draft.material(Material::Plain { colour, gloss: 0.1 });
+    let r = seed.at(31).range(0.012, 0.026);
+    let body = Geometry::Pillar { base: at, height: 3.0 * r, bottom: r, top: 0.5 * r };
+    draft.add(body, plain, seed.bits());
+    let head = Geometry::ball(at + Vec3::Z * (3.4 * r), Vec3::splat(0.6 * r));
+    draft.add(head, plain, seed.bits());
 }
 
 fn toy_house(draft: &mut Draft, at: Vec3, cell: f32, dark: u32, seed: Seed) {
@@ -137,7 +134,7 @@ fn toy_house(draft: &mut Draft, at: Vec3, cell: f32, dark: u32, seed: Seed) {
 fn toy_car(draft: &mut Draft, at: Vec3, dark: u32, seed: Seed) {
     let paint =
         draft.material(Material::Plain { colour: hue(seed.at(3).unit(), 0.85, 0.7), gloss: 0.3 });
-    let angle = seed.at(4).range(0.0, 6.28);
+    let angle = seed.at(4).range(0.0, std::f32::consts::TAU);
     draft.add(
         Geometry::block(at + Vec3::Z * 0.014, Vec3::new(0.07, 0.03, 0.016), angle),
         paint,

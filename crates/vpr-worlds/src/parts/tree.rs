@@ -33,7 +33,7 @@ pub(crate) struct Grove {
 
 impl Grove {
     pub(crate) fn new(draft: &mut Draft, seed: Seed, bare: f32) -> Self {
-        let bark = draft.material(Material::Plain { colour: rgb(84, 70, 58), gloss: 0.0 });
+        let trunk = draft.material(Material::Plain { colour: rgb(84, 70, 58), gloss: 0.0 });
         let leaves = std::array::from_fn(|k| {
             let own = seed.named("leaves").at(k as i64);
             let colour = hue(
@@ -45,7 +45,7 @@ impl Grove {
         });
         let needles =
             draft.material(Material::Foliage { colour: rgb(44, 74, 50), evergreen: true });
-        Self { bark, leaves, needles, bare }
+        Self { bark: trunk, leaves, needles, bare }
     }
 
     /// One plant of this height with its foot at `foot`.
