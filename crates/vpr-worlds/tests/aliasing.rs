@@ -4,6 +4,12 @@
 //! origin. The ideal matcher therefore holds images for equal that differ by less than 8 grey
 //! levels RMS, which is below what sensor noise does, and picks among them at random.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test fails by panicking and prints what it measured"
+)]
+
 use vpr_worlds::{World, recipe_with};
 
 /// Mean squared difference below which images are equal to the eye.

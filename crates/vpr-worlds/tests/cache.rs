@@ -1,5 +1,7 @@
 //! Same bytes on any number of threads, and nothing half-written is ever opened.
 
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::{fs, path::Path};
 
 use vpr_worlds::{Recipe, World, recipe_with};

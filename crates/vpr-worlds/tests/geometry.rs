@@ -1,5 +1,13 @@
 //! Depth and pose of one image predict where its points are in another.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test fails by panicking and prints what it measured; pixels are small"
+)]
+
 use image::GrayImage;
 use nalgebra::Point3;
 use ndarray::Array2;

@@ -1,4 +1,6 @@
 //! The `worlds` program.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 #![cfg(feature = "cli")]
 
 use std::process::{Command, Output};

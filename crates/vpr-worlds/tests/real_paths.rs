@@ -1,5 +1,11 @@
 //! Rooms along the real camera paths of 7-Scenes; needs `VPR_DATA`.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test fails by panicking and prints what it measured"
+)]
+
 use vpr_worlds::{Side, World, recipe_with};
 
 #[test]
