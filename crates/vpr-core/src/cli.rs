@@ -5,6 +5,7 @@ use std::{
     io::{ErrorKind, IsTerminal, Write},
     path::{Path, PathBuf},
     process::ExitCode,
+    sync::Mutex,
 };
 
 use anyhow::Context;
@@ -12,6 +13,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::{
+    Observer,
     experiment::Experiment,
     figure::Figure,
     table::{Format, Table, check, csv_page, markdown_page, read_csv},
@@ -26,12 +28,29 @@ pub enum Outcome {
     Mismatch,
 }
 
+impl Outcome {
+    /// The worse of two.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        if self == Self::Success { other } else { self }
+    }
+}
+
 /// Where an experiment finds its data.
 #[derive(Args, Clone, Debug)]
 pub struct DataArgs {
     /// Folder of the datasets; `data/README.md` says what belongs in it
     #[arg(long, env = "VPR_DATA", value_name = "DIR", default_value = "data", global = true)]
     pub data: PathBuf,
+    /// Folder that keeps generated places once they are rendered
+    #[arg(
+        long,
+        env = "VPR_CACHE",
+        value_name = "DIR",
+        default_value = "data/worlds",
+        global = true
+    )]
+    pub cache: PathBuf,
 }
 
 /// How results are printed and kept.
@@ -97,6 +116,33 @@ pub fn progress(what: &str, n: usize) -> ProgressBar {
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar.set_message(what.to_owned());
     bar
+}
+
+/// The progress bar of the work under way, on stderr.
+#[derive(Default)]
+pub struct Bar(Mutex<Option<ProgressBar>>);
+
+impl Bar {
+    fn with(&self, act: impl FnOnce(&mut Option<ProgressBar>)) {
+        // A poisoned lock means another thread panicked: progress no longer matters.
+        if let Ok(mut bar) = self.0.lock() {
+            act(&mut bar);
+        }
+    }
+}
+
+impl Observer for Bar {
+    fn start(&self, what: &str, n: usize) {
+        self.with(|bar| *bar = Some(progress(what, n)));
+    }
+
+    fn step(&self) {
+        self.with(|bar| bar.iter().for_each(|bar| bar.inc(1)));
+    }
+
+    fn end(&self) {
+        self.with(|bar| bar.take().iter().for_each(ProgressBar::finish_and_clear));
+    }
 }
 
 /// Prints a result and, as the flags say, writes its page or checks it.

@@ -41,6 +41,7 @@ mod geometry;
 mod layout;
 mod light;
 mod material;
+mod named;
 mod noise;
 mod overlap;
 mod parts;
@@ -61,6 +62,7 @@ pub use family::{
 };
 pub use film::Film;
 pub use layout::Side;
+pub use named::{entry, is_world, named_recipe, open_named};
 pub use preview::preview;
 pub use recipe::{Layout, Offset, Recipe, Tolerance, Traverse};
 pub use world::{RENDERER, World};

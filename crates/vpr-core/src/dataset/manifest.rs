@@ -9,7 +9,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::layout::vpr_bench::GroundTruthFile;
-use crate::{Error, Result};
+use crate::{Error, Result, table::Provenance};
 
 /// All known datasets, in the order of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -40,6 +40,10 @@ pub struct DatasetEntry {
     pub references: Option<usize>,
     /// How far a correct reference may be, as the thesis states it.
     pub tolerance: Tolerance,
+    /// Metres between consecutive frames, where the layout has no positions but this is known.
+    pub spacing_m: Option<f64>,
+    /// First frame used and the one after the last, of an archive of which not all is used.
+    pub frames: Option<(usize, usize)>,
     /// Citation or address.
     pub origin: String,
     /// Licence of the data.
@@ -58,7 +62,7 @@ pub enum Layout {
     ImagePairs,
     /// `queries/` and `database/` with positions in the names.
     UtmNames,
-    /// Arrays of images in one archive.
+    /// Two traverses as arrays of images in one archive, aligned by index.
     Npz,
     /// Sequences of frames with a pose each, or lists of such poses.
     SevenScenes,
@@ -151,6 +155,13 @@ impl Manifest {
 }
 
 impl DatasetEntry {
+    /// Where numbers from its images come from: drawn ones are `generated`, others `measured`.
+    #[must_use]
+    pub fn provenance(&self) -> Provenance {
+        let is_generated = self.path.starts_with("fixture") || self.id.starts_with("world/");
+        if is_generated { Provenance::Generated } else { Provenance::Measured }
+    }
+
     /// The ground truth file of a VPR-Bench dataset; its images need not be there.
     ///
     /// # Errors

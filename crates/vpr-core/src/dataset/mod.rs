@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 pub use manifest::{DataRoots, DatasetEntry, Layout, Manifest, Tolerance};
 pub use validate::{Problem, Severity, validate};
 
-use crate::{Error, GroundTruth, Poses, Result};
+use crate::{Error, GroundTruth, PlanarPosition, Poses, Result, table::Provenance};
 use layout::{
+    seven_scenes,
     utm_names::UtmFolder,
     vpr_bench::{GroundTruthFile, image_folder},
 };
@@ -32,6 +33,8 @@ pub struct Dataset {
     pub n_clamped: usize,
     /// Poses of queries and references, if the layout has them.
     pub poses: Option<(Poses, Poses)>,
+    /// Whether the images are real (`measured`) or drawn (`generated`).
+    pub provenance: Provenance,
 }
 
 impl Dataset {
@@ -41,15 +44,17 @@ impl Dataset {
     ///
     /// [`Error::Io`] or [`Error::Format`] with the folder or file that is missing, empty or
     /// malformed; the latter also if the ground truth is not about as many queries as there are
-    /// images. [`Error::Parameter`] if the layout is not one of queries and references.
+    /// images. [`Error::Parameter`] if the layout is not one of image files; for archives see
+    /// [`layout::npz_images`].
     pub fn open(entry: &DatasetEntry, roots: &DataRoots) -> Result<Self> {
         let folder = roots.find(&entry.path)?;
         match entry.layout {
             Layout::VprBench => Self::open_vpr_bench(entry, &folder),
             Layout::ImagePairs => Self::open_pairs(entry, &folder),
             Layout::UtmNames => Self::open_utm(entry, &folder),
-            Layout::Npz | Layout::SevenScenes | Layout::InvarianceScores => {
-                let reason = "its layout is not one of query and reference images";
+            Layout::SevenScenes => Self::open_seven_scenes(entry, &folder),
+            Layout::Npz | Layout::InvarianceScores => {
+                let reason = "its layout is not one of query and reference image files";
                 Err(Error::Parameter { name: "dataset", value: entry.id.clone(), reason })
             }
         }
@@ -70,12 +75,44 @@ impl Dataset {
     fn open_pairs(entry: &DatasetEntry, folder: &Path) -> Result<Self> {
         let queries = image_folder(&folder.join("query"))?;
         let references = image_folder(&folder.join("ref"))?;
+        Self::of_pairs(entry, queries, references)
+    }
+
+    /// Two traverses that are aligned frame by frame.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] if the entry's tolerance is not in frames.
+    pub fn of_pairs(
+        entry: &DatasetEntry,
+        queries: Vec<PathBuf>,
+        references: Vec<PathBuf>,
+    ) -> Result<Self> {
         let Tolerance::Frames(tolerance) = entry.tolerance else {
             let reason = "image pairs need a tolerance in frames";
             return Err(Error::Parameter { name: "dataset", value: entry.id.clone(), reason });
         };
         let truth = GroundTruth::within_frames(queries.len(), references.len(), tolerance);
-        Ok(Self::new(entry, queries, references, truth))
+        let poses = entry.spacing_m.map(|spacing| {
+            let along = |n: usize| {
+                Poses::Planar(
+                    (0..n).map(|i| PlanarPosition::new(i as f64 * spacing, 0.0)).collect(),
+                )
+            };
+            (along(queries.len()), along(references.len()))
+        });
+        Ok(Self { poses, ..Self::new(entry, queries, references, truth) })
+    }
+
+    fn open_seven_scenes(entry: &DatasetEntry, folder: &Path) -> Result<Self> {
+        let (queries, references) = seven_scenes::open(folder)?;
+        let Tolerance::Metres(radius) = entry.tolerance else {
+            let reason = "positions need a tolerance in metres";
+            return Err(Error::Parameter { name: "dataset", value: entry.id.clone(), reason });
+        };
+        let truth = GroundTruth::within_radius(&queries.poses, &references.poses, radius)?;
+        let dataset = Self::new(entry, queries.images, references.images, truth);
+        Ok(Self { poses: Some((queries.poses, references.poses)), ..dataset })
     }
 
     fn open_utm(entry: &DatasetEntry, folder: &Path) -> Result<Self> {
@@ -97,8 +134,8 @@ impl Dataset {
         references: Vec<PathBuf>,
         truth: GroundTruth,
     ) -> Self {
-        let (id, name) = (entry.id.clone(), entry.name.clone());
-        Self { id, name, queries, references, truth, n_clamped: 0, poses: None }
+        let (id, name, provenance) = (entry.id.clone(), entry.name.clone(), entry.provenance());
+        Self { id, name, queries, references, truth, n_clamped: 0, poses: None, provenance }
     }
 
     fn with_clamped(self, n_clamped: usize) -> Self {

@@ -7,6 +7,7 @@ use std::{
 };
 
 use super::layout::{
+    seven_scenes,
     utm_names::{UtmFolder, parse_name},
     vpr_bench::{GroundTruthFile, image_number, is_image},
 };
@@ -66,8 +67,11 @@ pub fn validate(folder: &Path, probe: Probe<'_>) -> Vec<Problem> {
         let n_queries = report.numbered_images(&folder.join("query"));
         let n_references = report.numbered_images(&folder.join("ref"));
         report.ground_truth(&folder.join("ground_truth_new.npy"), n_queries, n_references);
+    } else if has("seq-01") {
+        report.seven_scenes(folder);
     } else {
-        report.error(folder, "", "has neither query/ and ref/ nor queries/ and database/");
+        let reason = "has neither query/ and ref/, nor queries/ and database/, nor seq-01/";
+        report.error(folder, "", reason);
     }
     report.problems
 }
@@ -78,6 +82,19 @@ struct Report<'a> {
 }
 
 impl Report<'_> {
+    /// Checks sequences of frames with poses: the first malformed pose, every unreadable image.
+    fn seven_scenes(&mut self, folder: &Path) {
+        let sides = match seven_scenes::open(folder) {
+            Ok((queries, references)) => [queries, references],
+            Err(err) => return self.failure(folder, err),
+        };
+        for image in sides.iter().flat_map(|side| &side.images) {
+            if let Err(reason) = (self.probe)(image) {
+                self.error(image, "", reason);
+            }
+        }
+    }
+
     fn add(&mut self, severity: Severity, path: &Path, place: &str, reason: impl Into<String>) {
         let (path, place) = (path.to_owned(), place.to_owned());
         self.problems.push(Problem { severity, path, place, reason: reason.into() });

@@ -203,6 +203,8 @@ pub(crate) fn open(recipe: &Recipe, folder: &Path) -> vpr_core::Result<Dataset> 
             Tolerance::Frames(frames) => vpr_core::dataset::Tolerance::Frames(frames),
             Tolerance::RadiusM(radius) => vpr_core::dataset::Tolerance::Metres(radius),
         },
+        spacing_m: None,
+        frames: None,
         origin: format!("generated; counterpart: {}", recipe.counterpart),
         licence: "that of this toolkit".to_owned(),
         note: None,
@@ -252,6 +254,7 @@ fn seven_scenes(
         truth,
         n_clamped: 0,
         poses: Some((queries.poses.clone(), references.poses.clone())),
+        provenance: vpr_core::table::Provenance::Generated,
     }
 }
 
