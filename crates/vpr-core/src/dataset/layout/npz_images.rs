@@ -105,7 +105,11 @@ mod tests {
     /// Five frames of a checkerboard; `dark` ones are black.
     fn traverse(dark: &[usize]) -> Array3<u8> {
         Array3::from_shape_fn((5, 2, 4), |(frame, row, column)| {
-            if dark.contains(&frame) || (row + column) % 2 == 0 { 0 } else { 100 + frame as u8 }
+            if dark.contains(&frame) || (row + column) % 2 == 0 {
+                0
+            } else {
+                u8::try_from(100 + frame).unwrap()
+            }
         })
     }
 
