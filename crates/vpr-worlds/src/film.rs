@@ -1,5 +1,7 @@
 //! From linear colours to bytes: lens, exposure, noise, and what age does to a print.
 
+use std::sync::LazyLock;
+
 use glam::Vec3;
 use image::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
@@ -88,9 +90,9 @@ impl Film {
             light = light.lerp(Vec3::splat(0.8), flakes.get(index).copied().unwrap_or(0.0));
             let hash = cell(key, x as i32, y as i32);
             let draw = Vec3::new(normal(hash), normal(mix(hash ^ 1)), normal(mix(hash ^ 2)));
-            let spread = noise * (gain.sqrt() + 2.0 * light.max_element().max(0.0).sqrt());
+            let spread = noise * (gain.sqrt() + light.max_element().max(0.0).sqrt());
             let toned = tone(light + draw * spread);
-            let aged = self.age(toned, x, y, (across, down), key);
+            let aged = self.age(muted(toned), x, y, (across, down), key);
             Rgb([aged.x, aged.y, aged.z].map(|c| (c * 255.0 + 0.5).clamp(0.0, 255.0) as u8))
         })
     }
@@ -128,9 +130,30 @@ fn tone(light: Vec3) -> Vec3 {
     let curve = |x: f32| {
         let x = x.max(0.0);
         let print = x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14);
-        libm::powf(print.min(1.0), 1.0 / 2.2)
+        eye(print.min(1.0))
     };
     Vec3::new(curve(light.x), curve(light.y), curve(light.z))
+}
+
+/// Colours as lenses and sensors give them: paler than paint, the more so the stronger they are.
+fn muted(colour: Vec3) -> Vec3 {
+    let grey = colour.dot(Vec3::new(0.299, 0.587, 0.114));
+    let strength = (colour.max_element() - colour.min_element()).clamp(0.0, 1.0);
+    colour.lerp(Vec3::splat(grey), 0.15 + 0.35 * strength)
+}
+
+/// Steps of the table in [`eye`].
+const STEPS: usize = 512;
+
+/// `x` to the power 1 / 2.2 for `x` in 0 to 1, off by less than 10⁻⁴: a table over the square root,
+/// of which it is nearly a straight line.
+fn eye(x: f32) -> f32 {
+    static TABLE: LazyLock<Vec<f32>> = LazyLock::new(|| {
+        (0..=STEPS + 1).map(|k| libm::powf(k as f32 / STEPS as f32, 2.0 / 2.2)).collect()
+    });
+    let at = x.sqrt() * STEPS as f32;
+    let step = at as usize;
+    lerp(TABLE[step], TABLE[step + 1], at - step as f32)
 }
 
 fn blur(colours: &[Colour], width: usize, sigma: f32) -> Vec<Colour> {

@@ -114,14 +114,22 @@ impl Light {
             }
         }
         let glare = direction.dot(self.sun).max(0.0);
-        let glare = libm::powf(glare, 60.0) * 0.6 + if glare > 0.9995 { 6.0 } else { 0.0 };
-        colour + self.sunlight * glare * (1.0 - self.cloud)
+        let disc = if glare > 0.9995 { 6.0 } else { 0.0 };
+        colour + self.sunlight * (0.6 * halo(glare) + disc) * (1.0 - self.cloud)
     }
 
     /// Share of light left after `distance` metres of haze.
     pub(crate) fn clear(&self, distance: f32) -> f32 {
         libm::expf(-self.haze * distance)
     }
+}
+
+/// The sixtieth power: the bright sky around the sun.
+fn halo(x: f32) -> f32 {
+    let fourth = (x * x) * (x * x);
+    let twelfth = fourth * fourth * fourth;
+    let thirtieth = twelfth * twelfth * fourth * (x * x);
+    thirtieth * thirtieth
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "recipes are f64, rendering is f32")]

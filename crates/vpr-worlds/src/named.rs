@@ -141,7 +141,7 @@ fn unpack(entry: &DatasetEntry, folder: &Path, cache: &Path) -> Result<Dataset> 
     for side in [&pairs.references, &pairs.queries] {
         digest.update(side.as_standard_layout().as_slice().unwrap_or_default());
     }
-    let short: String = digest.finalize().iter().take(8).map(|it| format!("{it:02x}")).collect();
+    let short = crate::world::hex(&digest.finalize()[..8]);
     let root = cache.join(format!("{}-{short}", entry.id));
     let queries = unpack_side(&pairs.queries, &pairs.frames, &root.join("query"))?;
     let references = unpack_side(&pairs.references, &pairs.frames, &root.join("ref"))?;

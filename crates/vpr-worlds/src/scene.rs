@@ -102,7 +102,12 @@ impl Scene {
                 Aabb::new(Vec3A::from(low - SLACK), Vec3A::from(high + SLACK))
             })
             .collect();
-        let hierarchy = hierarchy(&bounds);
+        let mut hierarchy = hierarchy(&bounds);
+        // Shapes in the order in which rays meet them: those of one box lie side by side.
+        let order = std::mem::take(&mut hierarchy.primitive_indices);
+        let mut places: Vec<Option<Shape>> = shapes.into_iter().map(Some).collect();
+        let in_order = order.iter().map(|&index| places[index as usize].take());
+        shapes = in_order.map(|shape| shape.expect("each shape is in one box")).collect();
         let grid = LampGrid::new(&lamps);
         let n_narrow = shapes.len() as u32;
         shapes.extend(wide);
@@ -123,12 +128,10 @@ impl Scene {
         let mut hit = RayHit::none();
         let probe = probe(ray, limit.min(self.way_out(ray)));
         self.hierarchy.ray_traverse(probe, &mut hit, |probe, id| {
-            let shape = self.hierarchy.primitive_indices[id] as usize;
-            self.shapes[shape].geometry.hit(ray, probe.tmax).unwrap_or(f32::INFINITY)
+            self.shapes[id].geometry.hit(ray, probe.tmax).unwrap_or(f32::INFINITY)
         });
         if hit.t < limit {
-            let shape = self.hierarchy.primitive_indices[hit.primitive_id as usize];
-            return Some(Hit { t: hit.t, shape });
+            return Some(Hit { t: hit.t, shape: hit.primitive_id });
         }
         nearest
     }
@@ -136,8 +139,7 @@ impl Scene {
     /// Whether nothing is on the ray within `limit` metres; wide shapes cast no shadows.
     pub(crate) fn is_free(&self, ray: &Ray, limit: f32) -> bool {
         self.hierarchy.ray_traverse_miss(probe(ray, limit.min(self.way_out(ray))), |probe, id| {
-            let shape = self.hierarchy.primitive_indices[id] as usize;
-            self.shapes[shape].geometry.hit(ray, probe.tmax).unwrap_or(f32::INFINITY)
+            self.shapes[id].geometry.hit(ray, probe.tmax).unwrap_or(f32::INFINITY)
         })
     }
 

@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// Changes with every change of the bytes that any recipe gives; part of the folder's name.
-pub const RENDERER: u32 = 2;
+pub const RENDERER: u32 = 3;
 
 /// Quality of JPEG files.
 const QUALITY: u8 = 92;
@@ -331,7 +331,7 @@ fn digest(root: &Path) -> Result<(usize, u64, String)> {
     Ok((files.len(), n_bytes, hex(&all.finalize())))
 }
 
-fn hex(bytes: &[u8]) -> String {
+pub(crate) fn hex(bytes: &[u8]) -> String {
     let digits: Vec<String> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
     digits.concat()
 }

@@ -322,10 +322,10 @@ impl Facade {
         let reach = 0.15 + 0.33 * unit(mix(own ^ 1));
         let thing = unit(own) < 0.6 && middle.abs().max_element() < reach;
         let colour = if thing {
-            hue(unit(mix(own ^ 2)), 0.6, 0.8)
+            hue(unit(mix(own ^ 2)), 0.15 + 0.45 * unit(mix(own ^ 3)), 0.75)
         } else {
             ground * 0.12 + Vec3::splat(0.03)
         };
-        Paint { glow: colour * 0.7 * night, open: 0.6, ..Paint::glossy(colour * 0.6, 0.22) }
+        Paint { glow: colour * 0.7 * night, open: 0.6, ..Paint::glossy(colour * 0.4, 0.3) }
     }
 }

@@ -112,7 +112,7 @@ impl Furnisher {
         let plain = std::array::from_fn(|k| {
             let own = seed.named("plain").at(k as i64);
             let colour =
-                hue(own.at(0).unit(), own.at(1).range(0.1, 0.7), own.at(2).range(0.2, 0.85));
+                hue(own.at(0).unit(), own.at(1).range(0.05, 0.55), own.at(2).range(0.2, 0.85));
             draft.material(Material::Plain { colour, gloss: 0.03 })
         });
         let doors = std::array::from_fn(|k| {

@@ -158,7 +158,7 @@ fn wall_colour(wall: Wall, seed: Seed) -> Colour {
         Wall::Stone => rgb(176, 166, 148) * seed.at(0).range(0.7, 1.15),
         Wall::Concrete => rgb(150, 150, 148) * seed.at(0).range(0.6, 1.15),
         Wall::Clapboard => {
-            hue(seed.at(0).unit(), seed.at(1).range(0.05, 0.35), seed.at(2).range(0.6, 0.95))
+            hue(seed.at(0).unit(), seed.at(1).range(0.03, 0.22), seed.at(2).range(0.6, 0.95))
         }
     }
 }

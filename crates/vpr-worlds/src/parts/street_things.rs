@@ -17,7 +17,7 @@ pub(crate) struct StreetKit {
     tyre: u32,
     glass: u32,
     skin: u32,
-    cars: [u32; 6],
+    cars: [u32; 10],
     coats: [u32; 6],
     signs: [u32; 4],
 }
@@ -26,12 +26,16 @@ impl StreetKit {
     pub(crate) fn new(draft: &mut Draft, seed: Seed) -> Self {
         let metal = hue(seed.at(0).unit(), 0.3, seed.at(1).range(0.15, 0.45));
         let cars = [
-            rgb(190, 192, 195),
+            rgb(176, 179, 183),
             rgb(40, 42, 48),
-            rgb(150, 26, 30),
-            rgb(38, 66, 120),
-            rgb(225, 224, 218),
-            rgb(92, 104, 84),
+            rgb(134, 36, 38),
+            rgb(52, 70, 104),
+            rgb(222, 221, 216),
+            rgb(92, 100, 86),
+            rgb(112, 116, 121),
+            rgb(30, 33, 40),
+            rgb(150, 140, 122),
+            rgb(72, 84, 96),
         ];
         Self {
             metal: draft.material(Material::Plain { colour: metal, gloss: 0.1 }),
@@ -130,7 +134,7 @@ impl StreetKit {
                 let size = Vec3::new(0.4, 0.5, 1.3);
                 draft.add(
                     Geometry::block(foot + Vec3::Z * 0.65, size, 0.0),
-                    self.cars[seed.at(1).index(6)],
+                    self.cars[seed.at(1).index(self.cars.len())],
                     seed.bits(),
                 );
             }
@@ -142,7 +146,7 @@ impl StreetKit {
         let van = seed.at(0).chance(0.18);
         let length = if van { 5.2 } else { seed.at(1).range(3.9, 4.6) };
         let body = if van { 1.85 } else { 0.62 };
-        let paint = self.cars[seed.at(2).index(6)];
+        let paint = self.cars[seed.at(2).index(self.cars.len())];
         let turn = Vec2::new(libm::cosf(angle), libm::sinf(angle));
         let along = Vec3::new(turn.x, turn.y, 0.0);
         let across = Vec3::new(-turn.y, turn.x, 0.0);
@@ -247,7 +251,7 @@ pub(crate) fn hide_behind(
             half: Vec3::new(0.5 * wide, 0.01, 6.0),
             turn,
         };
-        let material = kit.cars[own.at(5).index(6)];
+        let material = kit.cars[own.at(5).index(kit.cars.len())];
         shapes.push(Shape { geometry: side, material, seed: own.bits(), moving: true });
         kit.body(&mut shapes, at(2.2), across, own);
     }

@@ -37,9 +37,9 @@ impl Grove {
         let leaves = std::array::from_fn(|k| {
             let own = seed.named("leaves").at(k as i64);
             let colour = hue(
-                own.at(0).range(0.22, 0.34),
-                own.at(1).range(0.4, 0.65),
-                own.at(2).range(0.35, 0.55),
+                own.at(0).range(0.19, 0.3),
+                own.at(1).range(0.35, 0.55),
+                own.at(2).range(0.34, 0.5),
             );
             draft.material(Material::Foliage { colour, evergreen: false })
         });
@@ -71,20 +71,17 @@ impl Grove {
             }
             Species::Broad | Species::Poplar => {
                 let trunk = height * if species == Species::Broad { 0.38 } else { 0.15 };
+                let stem = height * if species == Species::Broad { 0.57 } else { 0.8 };
                 let thick = 0.02 * height + 0.03;
                 draft.add(
-                    Geometry::Pillar {
-                        base: foot,
-                        height: trunk * 1.5,
-                        bottom: thick,
-                        top: 0.6 * thick,
-                    },
+                    Geometry::Pillar { base: foot, height: stem, bottom: thick, top: 0.6 * thick },
                     self.bark,
                     seed.bits(),
                 );
                 let wide = height
                     * if species == Species::Broad { seed.at(90).range(0.22, 0.32) } else { 0.12 };
-                let n = if species == Species::Broad { 10 } else { 6 };
+                let n = if species == Species::Broad { 12 } else { 8 };
+                let tall = if species == Species::Broad { 0.85 } else { 1.5 };
                 for part in 0..n {
                     let own = seed.at(part);
                     let level = own.at(0).unit();
@@ -97,7 +94,7 @@ impl Grove {
                     self.crown(
                         draft,
                         foot + shift + Vec3::Z * z,
-                        Vec3::new(r, r, r * 0.85),
+                        Vec3::new(r, r, r * tall),
                         seed,
                         own,
                     );
@@ -125,8 +122,9 @@ impl Grove {
     }
 
     fn crown(&self, draft: &mut Draft, center: Vec3, radii: Vec3, tree: Seed, own: Seed) {
-        let holes = 0.42 + 0.25 * self.bare;
-        let grain = 0.2 * (1.0 - 0.45 * self.bare) * radii.x.clamp(0.7, 2.0);
+        // Without leaves: many small gaps, as between twigs.
+        let holes = 0.42 + 0.2 * self.bare;
+        let grain = 0.2 * (1.0 - 0.7 * self.bare) * radii.x.clamp(0.7, 2.0);
         let geometry = Geometry::Ellipsoid { center, radii, holes, grain, seed: own.at(7).bits() };
         draft.add(geometry, self.leaves[tree.at(92).index(4)], own.at(8).bits());
     }
