@@ -1,5 +1,7 @@
 //! Datasets by name: generated ones, those of the manifest, and those that are not at hand.
 
+#![allow(clippy::print_stdout, reason = "says which test needs data")]
+
 use std::{
     env,
     path::{Path, PathBuf},
