@@ -1,1 +1,19 @@
-//! Training: optimisers, schedules, checkpoints.
+//! Training: optimisers, schedules, checkpoints, weights drawn from a seed, and the loop.
+
+mod checkpoint;
+mod descent;
+mod optimizer;
+mod schedule;
+mod seed;
+
+pub use checkpoint::Checkpoint;
+pub use descent::{Batch, Descent, Report, Trainable};
+pub use optimizer::Optimizer;
+pub use schedule::Schedule;
+pub use seed::seeded;
+
+/// The device that networks are trained on: the default CPU backend with gradients.
+#[must_use]
+pub fn device() -> burn::tensor::Device {
+    burn::tensor::Device::flex().autodiff()
+}

@@ -1,0 +1,3 @@
+//! Networks of our own.
+
+pub mod default;
