@@ -18,17 +18,31 @@ const RECIPES: [(&str, &str); N_RECIPES] = embedded![
     "street-aliased",
     "street-night",
     "street-snow",
+    "street-fog",
     "street-grey",
     "street-new-places",
+    "street-pittsburgh",
+    "street-san-francisco",
+    "street-st-lucia",
+    "street-eynsham",
+    "street-msls",
+    "rail-nordland",
+    "street-tokyo",
+    "street-seasons",
+    "street-holidays",
     "train-city",
     "rail",
     "campus",
     "campus-dusk",
+    "campus-essex",
+    "campus-fog",
     "corridor",
     "rooms",
+    "living-room",
     "escalator",
     "shop-facade",
     "archive",
+    "light-stage",
     "light-stage-viewpoints",
     "light-stage-lights",
     "multi-lane",
@@ -41,7 +55,7 @@ const RECIPES: [(&str, &str); N_RECIPES] = embedded![
     "seven-scenes-redkitchen",
     "seven-scenes-stairs",
 ];
-const N_RECIPES: usize = 26;
+const N_RECIPES: usize = 40;
 
 /// Names of the recipes that ship with this crate, without `world/`.
 #[must_use]

@@ -49,6 +49,7 @@ mod preview;
 mod recipe;
 mod render;
 mod scene;
+mod scenery;
 mod seed;
 mod world;
 
@@ -65,6 +66,7 @@ pub use layout::Side;
 pub use named::{entry, is_world, named_recipe, open_named};
 pub use preview::preview;
 pub use recipe::{Layout, Offset, Recipe, Tolerance, Traverse};
+pub use scenery::{Photograph, Scenery, photograph_city};
 pub use world::{RENDERER, World};
 
 /// Opens the world called `name` (with or without `world/`), rendering it into `cache` if it is

@@ -7,13 +7,19 @@ use std::{
 
 use anyhow::Context;
 use clap::{Args as ClapArgs, Parser, Subcommand};
-use vpr_core::cli::{self, Outcome};
+use vpr_core::{
+    cli::{self, Outcome},
+    dataset::DataRoots,
+};
 use vpr_worlds::{Recipe, World, names, preview, recipe_with};
 
 /// Generated places with exact poses and quantified nuisances.
 #[derive(Parser)]
 #[command(version, about, propagate_version = true)]
 struct Args {
+    /// Folder of the datasets: rooms follow the published camera paths of 7-Scenes if it has them
+    #[arg(long, env = "VPR_DATA", value_name = "DIR", default_value = "data", global = true)]
+    data: PathBuf,
     #[command(subcommand)]
     command: Command,
 }
@@ -27,7 +33,7 @@ enum Command {
         #[command(flatten)]
         which: Which,
         /// Folder that keeps rendered worlds
-        #[arg(long, env = "VPR_CACHE", value_name = "DIR", default_value = "target/worlds")]
+        #[arg(long, env = "VPR_CACHE", value_name = "DIR", default_value = "data/worlds")]
         cache: PathBuf,
     },
     /// Write a contact sheet of references and queries side by side
@@ -54,22 +60,24 @@ struct Which {
 }
 
 impl Which {
-    fn recipe(&self) -> anyhow::Result<Recipe> {
+    fn recipe(&self, roots: &DataRoots) -> anyhow::Result<Recipe> {
         let pairs = self.settings.iter().map(|setting| {
             setting.split_once('=').with_context(|| format!("`{setting}` is not KEY=VALUE"))
         });
         let settings: Vec<(&str, &str)> = pairs.collect::<Result<_, _>>()?;
         let path = Path::new(&self.world);
         if path.extension().is_some_and(|extension| extension == "toml") {
-            return Ok(Recipe::read_with(path, &settings)?);
+            return Ok(Recipe::read_with(path, &settings)?.along_real_paths(roots));
         }
-        Ok(recipe_with(&self.world, &settings)?)
+        Ok(recipe_with(&self.world, &settings)?.along_real_paths(roots))
     }
 }
 
 fn main() -> ExitCode {
     cli::main(|| {
-        match Args::parse().command {
+        let args = Args::parse();
+        let roots = DataRoots::new([args.data]);
+        match args.command {
             Command::List => {
                 for name in names() {
                     let recipe = recipe_with(name, &[])?;
@@ -78,14 +86,14 @@ fn main() -> ExitCode {
                 }
             }
             Command::Render { which, cache } => {
-                let recipe = which.recipe()?;
+                let recipe = which.recipe(&roots)?;
                 let bar = cli::progress(&recipe.name, World::count(&recipe)?);
                 let world = World::open(&recipe, &cache, &|| bar.inc(1))?;
                 bar.finish_and_clear();
                 cli::print(&format!("{}\n", world.folder.display()))?;
             }
             Command::Preview { which, output, queries } => {
-                let sheet = preview(&which.recipe()?, queries, 3)?;
+                let sheet = preview(&which.recipe(&roots)?, queries, 3)?;
                 sheet.save(&output).with_context(|| output.display().to_string())?;
                 cli::note(&format!("generated: {}", output.display()));
             }

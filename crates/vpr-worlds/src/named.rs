@@ -96,7 +96,7 @@ pub fn open_named(
     observer: &dyn Observer,
 ) -> Result<Option<Dataset>> {
     if is_world(id) {
-        return render(id, cache, observer).map(Some);
+        return render(id, roots, cache, observer).map(Some);
     }
     let manifest = Manifest::builtin();
     let entry = manifest.find(id)?;
@@ -114,8 +114,8 @@ pub fn open_named(
     is_at_hand.then(|| Dataset::open(entry, roots)).transpose()
 }
 
-fn render(id: &str, cache: &Path, observer: &dyn Observer) -> Result<Dataset> {
-    let recipe = named_recipe(id)?;
+fn render(id: &str, roots: &DataRoots, cache: &Path, observer: &dyn Observer) -> Result<Dataset> {
+    let recipe = named_recipe(id)?.along_real_paths(roots);
     let n_images = World::count(&recipe)?;
     let begun = Once::new();
     let done = || {

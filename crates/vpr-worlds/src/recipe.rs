@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use vpr_core::Error;
+use vpr_core::{Error, dataset::DataRoots};
 
 use crate::{
     camera::Camera,
@@ -176,7 +176,7 @@ impl Recipe {
                 error.span().map_or_else(|| "recipe".to_owned(), |span| place(text, span.start));
             Error::format(path, place, error.message())
         })?;
-        recipe.check().map_err(|refusal| Error::format(path, refusal.key, refusal.reason))?;
+        recipe.checked(path)?;
         Ok(recipe)
     }
 
@@ -188,6 +188,24 @@ impl Recipe {
     pub fn read_with(path: &Path, settings: &[(&str, &str)]) -> vpr_core::Result<Self> {
         let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
         crate::catalog::set(&text, path, settings)
+    }
+
+    /// Lets rooms be seen along the published camera paths of 7-Scenes where a data folder has
+    /// them (`7scenes/poses`); recipes that name a folder themselves, and all others, stay as they
+    /// are.
+    #[must_use]
+    pub fn along_real_paths(mut self, roots: &DataRoots) -> Self {
+        if let Some(scenes) = &mut self.seven_scenes
+            && scenes.poses.is_none()
+        {
+            scenes.poses = roots.find(Path::new("7scenes/poses")).ok();
+        }
+        self
+    }
+
+    /// Checks all numbers; `path` is for messages.
+    pub(crate) fn checked(&self, path: &Path) -> vpr_core::Result<()> {
+        self.check().map_err(|refusal| Error::format(path, refusal.key, refusal.reason))
     }
 
     fn check(&self) -> Result<(), Refusal> {
@@ -206,9 +224,7 @@ impl Recipe {
             between("tolerance.radius_m", radius, 0.0, 10_000.0)?;
         }
         for traverse in [&self.references, &self.queries] {
-            traverse.condition.check()?;
-            traverse.film.check()?;
-            traverse.offset.check()?;
+            traverse.check()?;
         }
         let families: [Option<Result<(), Refusal>>; 6] = [
             self.street.as_ref().map(Street::check),
@@ -227,6 +243,19 @@ impl Recipe {
             });
         }
         families.into_iter().flatten().collect()
+    }
+}
+
+impl Traverse {
+    /// Checks all numbers; `path` is for messages.
+    pub(crate) fn checked(&self, path: &Path) -> vpr_core::Result<()> {
+        self.check().map_err(|refusal| Error::format(path, refusal.key, refusal.reason))
+    }
+
+    fn check(&self) -> Result<(), Refusal> {
+        self.condition.check()?;
+        self.film.check()?;
+        self.offset.check()
     }
 }
 

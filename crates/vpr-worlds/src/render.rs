@@ -7,7 +7,7 @@ use crate::{
     geometry::{Ray, Spot},
     light::Light,
     material::{Colour, Paint, Touch},
-    noise::{cloudy, step},
+    noise::{cloudy, lerp, step},
     scene::{Lamp, Scene, Shape},
 };
 
@@ -224,8 +224,10 @@ fn lamplight(view: &View<'_>, start: Vec3, normal: Vec3) -> Colour {
 fn cover_with_snow(paint: &mut Paint, touch: &Touch, normal: Vec3, snow: f32) {
     let at = Vec2::new(touch.point.x, touch.point.y);
     let patchy = cloudy(touch.seed ^ 0x51, at * 0.8, 4, 0.8 * touch.footprint);
-    let lies = step(0.25, 0.6, normal.z)
-        * step(1.0 - snow - 0.15, 1.0 - snow + 0.1, patchy * 0.7 + 0.3 * snow);
+    // The noise lies between about 0.2 and 0.8; from afar patches run together to their share.
+    let bare = lerp(0.82, 0.18, snow);
+    let near = step(bare - 0.07, bare + 0.07, patchy);
+    let lies = step(0.25, 0.6, normal.z) * lerp(near, snow, step(0.3, 1.5, touch.footprint));
     paint.albedo = paint.albedo.lerp(Vec3::new(0.86, 0.88, 0.92), lies);
     paint.gloss *= 1.0 - lies;
 }

@@ -3,6 +3,7 @@
 use std::{
     fs,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 use image::{
@@ -24,7 +25,7 @@ use crate::{
 };
 
 /// Changes with every change of the bytes that any recipe gives; part of the folder's name.
-pub const RENDERER: u32 = 3;
+pub const RENDERER: u32 = 4;
 
 /// Quality of JPEG files.
 const QUALITY: u8 = 92;
@@ -41,6 +42,11 @@ pub struct World {
     /// Its images and ground truth, as the reader of its layout gives them.
     pub dataset: Dataset,
 }
+
+/// What the names of folders begin with that are being rendered.
+const PARTIAL: &str = ".partial-";
+/// No render takes as long as this.
+const FORGOTTEN: Duration = Duration::from_hours(24);
 
 /// What must be in a complete folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -84,8 +90,15 @@ impl World {
     ///
     /// Those of reading the files that the recipe names.
     pub fn count(recipe: &Recipe) -> Result<usize> {
-        let plan = plan(recipe)?;
-        Ok(plan.references.len() + plan.queries.len() + plan.grid.len())
+        if recipe.stage.is_some() || recipe.seven_scenes.is_some() {
+            let plan = plan(recipe)?;
+            return Ok(plan.references.len() + plan.queries.len());
+        }
+        // The others need no scenes to tell.
+        let grid = recipe.street.and_then(|street| street.grid);
+        let n_views = grid.map_or(0, |grid| grid.rows * grid.columns);
+        let n_queries = recipe.places.div_ceil(recipe.query_every) + recipe.new_places;
+        Ok(recipe.places + n_queries + n_views)
     }
 
     /// The images of one side, in their order; [`Side::Grid`] has none unless the recipe asks.
@@ -187,8 +200,9 @@ fn write(
     done: &(dyn Fn() + Sync),
 ) -> Result<()> {
     fs::create_dir_all(cache).map_err(Error::io(cache))?;
+    sweep(cache);
     let partial =
-        tempfile::Builder::new().prefix(".partial-").tempdir_in(cache).map_err(Error::io(cache))?;
+        tempfile::Builder::new().prefix(PARTIAL).tempdir_in(cache).map_err(Error::io(cache))?;
     let root = partial.path();
     let mut plan = plan(recipe)?;
     layout::in_reading_order(recipe.layout, &mut plan);
@@ -219,6 +233,19 @@ fn write(
         // Somebody else finished the same world first.
         Err(_) if is_complete(folder)? => Ok(()),
         Err(cause) => Err(Error::io(folder)(cause)),
+    }
+}
+
+/// Removes what renders that were killed long ago have left.
+fn sweep(cache: &Path) {
+    let Ok(entries) = fs::read_dir(cache) else { return };
+    for entry in entries.flatten() {
+        let is_partial = entry.file_name().to_string_lossy().starts_with(PARTIAL);
+        let age = entry.metadata().and_then(|data| data.modified()).map(|time| time.elapsed());
+        if is_partial && matches!(age, Ok(Ok(age)) if age > FORGOTTEN) {
+            // Somebody else may be removing it too; what stays is never opened.
+            let _ = fs::remove_dir_all(entry.path());
+        }
     }
 }
 

@@ -19,12 +19,15 @@ struct Frame {
     pose: vpr_core::Pose,
 }
 
-fn frame(world: &World, side: Side) -> Frame {
-    let path = &world.images(side).unwrap()[0];
+fn frame(world: &World, (side, index): (Side, usize)) -> Frame {
+    let path = &world.images(side).unwrap()[index];
     let image = image::open(path).unwrap().to_luma8();
-    let pose = world.poses(side).unwrap().six_dof().unwrap()[0];
-    Frame { image, depth: world.depth(side, 0).unwrap(), pose }
+    let pose = world.poses(side).unwrap().six_dof().unwrap()[index];
+    Frame { image, depth: world.depth(side, index).unwrap(), pose }
 }
+
+/// The first image of the references, and of the queries.
+const FIRST: [(Side, usize); 2] = [(Side::References, 0), (Side::Queries, 0)];
 
 fn still(name: &str, more: &[(&str, &str)]) -> World {
     let mut settings = vec![
@@ -75,6 +78,27 @@ fn predicted(world: &World, a: &Frame, b: &Frame) -> Vec<((f64, f64), (f64, f64)
     pairs
 }
 
+/// Median distance, pixels, between where points come back to by the depth of `b` and where they
+/// came from, and the number of points.
+fn round_trip(world: &World, a: &Frame, b: &Frame) -> (f64, usize) {
+    let camera = world.recipe.camera;
+    let pairs = predicted(world, a, b);
+    assert!(pairs.len() > 100, "{}: only {} points", world.recipe.name, pairs.len());
+    let errors = pairs.iter().map(|&(from, to)| {
+        let depth = f64::from(b.depth[(to.1 as usize, to.0 as usize)]);
+        let ray = camera.direction(to.0.floor() + 0.5, to.1.floor() + 0.5);
+        let point = a.pose.inverse() * (b.pose * Point3::from(ray * (depth / ray.z)));
+        let back = camera.project(&point.coords).unwrap_or((-99.0, -99.0));
+        // The pixel's middle is up to half a pixel from the predicted point: take that off.
+        let off = (to.0 - to.0.floor() - 0.5, to.1 - to.1.floor() - 0.5);
+        (back.0 - from.0 + off.0).hypot(back.1 - from.1 + off.1)
+    });
+    (median(errors.collect()), pairs.len())
+}
+
+/// A world, what is set in it, and which two images are compared.
+type Case<'a> = (&'a str, &'a [(&'a str, &'a str)], [(Side, usize); 2]);
+
 #[test]
 fn depth_and_pose_agree_between_two_views_of_every_family() {
     let moves = [
@@ -82,26 +106,68 @@ fn depth_and_pose_agree_between_two_views_of_every_family() {
         ("references.condition.traffic", "0.0"),
         ("queries.condition.traffic", "0.0"),
     ];
-    for name in ["street", "rail", "campus", "corridor", "rooms"] {
-        let world = still(name, &moves);
-        let (a, b) = (frame(&world, Side::References), frame(&world, Side::Queries));
-        let pairs = predicted(&world, &a, &b);
-        assert!(pairs.len() > 200, "{name}: only {} points", pairs.len());
-        let camera = world.recipe.camera;
-        // There and back again: the depth at the predicted pixel leads back to where it came from.
-        let errors = pairs.iter().map(|&(from, to)| {
-            let depth = f64::from(b.depth[(to.1 as usize, to.0 as usize)]);
-            let ray = camera.direction(to.0.floor() + 0.5, to.1.floor() + 0.5);
-            let point = a.pose.inverse() * (b.pose * Point3::from(ray * (depth / ray.z)));
-            let back = camera.project(&point.coords).unwrap_or((-99.0, -99.0));
-            // The pixel's middle is up to half a pixel from the predicted point: take that off.
-            let off = (to.0 - to.0.floor() - 0.5, to.1 - to.1.floor() - 0.5);
-            (back.0 - from.0 + off.0).hypot(back.1 - from.1 + off.1)
-        });
-        let error = median(errors.collect());
-        println!("{name}: median reprojection error {error:.3} px over {} points", pairs.len());
+    let of_grid = [("street.grid", "{ rows = 2, columns = 1, step_m = 0.5 }")];
+    let distorted = [moves[0], moves[1], moves[2], ("camera.distortion", "-0.05")];
+    let second = [(Side::References, 0), (Side::References, 1)];
+    let grid = [(Side::Grid, 0), (Side::Grid, 1)];
+    let viewpoint = [(Side::References, 0), (Side::Queries, 10)];
+    // These two take many images: smaller ones.
+    let small = [("camera", "{ width = 160, height = 120, focal = 115.0 }")];
+    let many = [small[0], ("places", "40"), ("query_every", "40")];
+    let cases: [Case; 11] = [
+        ("street", &moves, FIRST),
+        ("street", &distorted, FIRST),
+        ("rail", &moves, FIRST),
+        ("campus", &moves, FIRST),
+        ("corridor", &moves, FIRST),
+        ("rooms", &moves, FIRST),
+        ("escalator", &moves, FIRST),
+        ("shop-facade", &of_grid, grid),
+        ("seven-scenes-office", &many, second),
+        ("light-stage-viewpoints", &small, viewpoint),
+        ("multi-lane", &[("references.condition.traffic", "0.0")], [FIRST[0], (Side::Queries, 1)]),
+    ];
+    for (name, settings, which) in cases {
+        let world = still(name, settings);
+        let [a, b] = which.map(|which| frame(&world, which));
+        let (error, n) = round_trip(&world, &a, &b);
+        println!("{name}: median reprojection error {error:.3} px over {n} points");
         assert!(error < 0.5, "{name}: {error} px");
     }
+}
+
+#[test]
+fn the_overlap_is_symmetric_sideways_and_not_along_the_view() {
+    let settings = [
+        ("places", "12"),
+        ("street.avenues", "1"),
+        ("overlap", "true"),
+        ("camera.width", "160"),
+        ("camera.height", "120"),
+        ("camera.focal", "115.0"),
+        ("street.spacing_m", "2.5"),
+        ("queries.offset", "{}"),
+        ("references.condition.traffic", "0.0"),
+        ("queries.condition.traffic", "0.0"),
+    ];
+    let matrix = |heading: &str| {
+        let cache = tempfile::tempdir().unwrap();
+        let mut all = settings.to_vec();
+        all.push(("street.heading_deg", heading));
+        let recipe = recipe_with("street", &all).unwrap();
+        World::open(&recipe, cache.path(), &|| {}).unwrap().overlap().unwrap()
+    };
+    // The largest difference between two places' views of one another, beyond the crossing.
+    let skew = |matrix: &Array2<f32>| {
+        let all = (6..12).flat_map(|a| (6..12).map(move |b| (a, b)));
+        all.map(|(a, b)| (matrix[(a, b)] - matrix[(b, a)]).abs()).fold(0.0, f32::max)
+    };
+    let (sideways, ahead) = (matrix("90.0"), matrix("0.0"));
+    println!("largest skew: {:.3} sideways, {:.3} ahead", skew(&sideways), skew(&ahead));
+    // A plane would give none (see the tests of `overlap`); houses have edges and trees before them.
+    assert!(skew(&sideways) < 0.25 * skew(&ahead), "{sideways:.2}\n{ahead:.2}");
+    // Who stands ahead sees less of what is seen from behind than the other way round.
+    assert!((6..11).all(|a| ahead[(a, 11)] < ahead[(11, a)]), "{ahead:.2}");
 }
 
 /// Brightness at a point, between its four pixels.
@@ -127,7 +193,7 @@ fn images_agree_best_exactly_where_depth_and_pose_predict() {
         ("queries.condition.traffic", "0.0"),
     ];
     let world = still("street", &moves);
-    let (a, b) = (frame(&world, Side::References), frame(&world, Side::Queries));
+    let (a, b): (Frame, Frame) = FIRST.map(|which| frame(&world, which)).into();
     let pairs = predicted(&world, &a, &b);
     let difference = |dx: f64, dy: f64| -> f64 {
         let each = pairs.iter().map(|&(from, to)| {

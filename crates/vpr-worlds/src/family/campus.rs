@@ -8,7 +8,7 @@ use crate::{
     geometry::Geometry,
     light::Light,
     material::{Facade, Front, Material, Opening, Wall, hue, rgb},
-    parts::{Grove, Species, StreetKit, hide_behind},
+    parts::{Grove, OUTDOORS, Species, StreetKit, hide_behind},
     recipe::{Recipe, Refusal, Traverse, between},
     scene::{Draft, Lamp, Scene},
     seed::Seed,
@@ -66,7 +66,7 @@ impl Campus {
         ];
         let share = recipe.queries.condition.occlusion;
         let (references, queries) = two_traverses(recipe, &route, seed, |pose, own| {
-            hide_behind(&kit, pose, &recipe.camera, share, own)
+            hide_behind(&kit, (pose, &recipe.camera), share, OUTDOORS, own)
         });
         Plan {
             scenes: vec![first, second],

@@ -8,7 +8,7 @@ use crate::{
     geometry::Geometry,
     light::Light,
     material::{Material, rgb},
-    parts::{Furnisher, Room, shell},
+    parts::{Furnisher, INDOORS, Room, StreetKit, hide_behind, shell},
     recipe::{Offset, Recipe, Refusal, Traverse, between, count},
     scene::{Draft, Lamp, Scene},
     seed::Seed,
@@ -83,22 +83,27 @@ impl Interior {
         let build = |traverse: &Traverse, number: i64| {
             let mut draft = Draft::default();
             let furnisher = Furnisher::new(&mut draft, seed.named("furnisher"));
+            let kit = StreetKit::new(&mut draft, seed.named("kit"));
             let visit = Visit { interior: self, furnisher, seed, number, traverse };
             match self.kind {
                 Kind::Corridor => visit.corridor(&mut draft, n),
                 Kind::Rooms => visit.rooms(&mut draft, n),
                 Kind::Escalator => visit.escalator(&mut draft, n),
             }
-            Scene::new(draft)
+            (Scene::new(draft), kit)
         };
-        let scenes = vec![build(&recipe.references, 0), build(&recipe.queries, 1)];
+        let (first, _) = build(&recipe.references, 0);
+        let (second, kit) = build(&recipe.queries, 1);
         let lights = vec![
             Light::indoors(&recipe.references.condition, seed.named("first light")),
             Light::indoors(&recipe.queries.condition, seed.named("second light")),
         ];
-        let (references, queries) = two_traverses(recipe, &route, seed, |_, _| Vec::new());
+        let share = recipe.queries.condition.occlusion;
+        let (references, queries) = two_traverses(recipe, &route, seed, |pose, own| {
+            hide_behind(&kit, (pose, &recipe.camera), share, INDOORS, own)
+        });
         Plan {
-            scenes,
+            scenes: vec![first, second],
             lights,
             references,
             queries,

@@ -79,6 +79,18 @@ pub(crate) fn plan(recipe: &Recipe) -> vpr_core::Result<Plan> {
     Ok(plans.into_iter().flatten().next().expect("a checked recipe has one family"))
 }
 
+/// Shots of a city, one per place and visit, place by place.
+///
+/// # Errors
+///
+/// [`vpr_core::Error::Format`] if the recipe is not of the street family.
+pub(crate) fn tour(recipe: &Recipe, visits: &[Traverse]) -> vpr_core::Result<Plan> {
+    let street = recipe.street.ok_or_else(|| {
+        vpr_core::Error::format(&recipe.name, "street", "is missing: only cities are toured")
+    })?;
+    Ok(street.tour(recipe, visits, Seed::new(recipe.seed)))
+}
+
 /// A camera at `eye` that looks along `heading` (radians counter-clockwise from +x), level.
 pub(crate) fn level_pose(eye: Vec3, heading: f64) -> vpr_core::Pose {
     let (sin, cos) = (libm::sin(heading), libm::cos(heading));

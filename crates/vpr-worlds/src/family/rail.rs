@@ -9,7 +9,7 @@ use crate::{
     light::Light,
     material::{Material, Wall, hue, rgb},
     noise::{cloudy, lerp, step},
-    parts::{Grove, Lot, Species, StreetKit, Style, house},
+    parts::{Grove, Lot, OUTDOORS, Species, StreetKit, Style, hide_behind, house},
     recipe::{Recipe, Refusal, Traverse, between},
     scene::{Draft, Scene},
     seed::Seed,
@@ -78,14 +78,18 @@ impl Rail {
                 level_pose(Vec3::new(bend(y), y, self.eye_m as f32), heading)
             })
             .collect();
-        let scenes = vec![line.build(&recipe.references, 0), line.build(&recipe.queries, 1)];
+        let (first, _) = line.build(&recipe.references, 0);
+        let (second, kit) = line.build(&recipe.queries, 1);
         let lights = vec![
             Light::new(&recipe.references.condition, seed.named("first light")),
             Light::new(&recipe.queries.condition, seed.named("second light")),
         ];
-        let (references, queries) = two_traverses(recipe, &route, seed, |_, _| Vec::new());
+        let share = recipe.queries.condition.occlusion;
+        let (references, queries) = two_traverses(recipe, &route, seed, |pose, own| {
+            hide_behind(&kit, (pose, &recipe.camera), share, OUTDOORS, own)
+        });
         Plan {
-            scenes,
+            scenes: vec![first, second],
             lights,
             references,
             queries,
@@ -132,7 +136,7 @@ impl Line<'_> {
         near + away * broad * 2.2 * self.rail.hills_m as f32 - 0.5
     }
 
-    fn build(&self, traverse: &Traverse, number: i64) -> Scene {
+    fn build(&self, traverse: &Traverse, number: i64) -> (Scene, StreetKit) {
         let mut draft = Draft::default();
         let kit = StreetKit::new(&mut draft, self.seed.named("kit"));
         let grove =
@@ -156,7 +160,7 @@ impl Line<'_> {
             station(&mut draft, &kit, start, self.seed.named("station").at(k), (people, traverse));
         }
         self.farms(&mut draft, &beside);
-        Scene::new(draft)
+        (Scene::new(draft), kit)
     }
 
     fn ground(&self, draft: &mut Draft, inside: &impl Fn(f32) -> bool) {

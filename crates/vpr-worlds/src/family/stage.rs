@@ -30,6 +30,8 @@ pub struct Stage {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StageKind {
+    /// Point Features: every viewpoint under every light, 4 522 images.
+    LightStage,
     /// Point Features: 119 viewpoints of a toy town under its first light.
     LightStageViewpoints,
     /// Point Features: the 19 lights of table 3.4 seen from the first viewpoint.
@@ -79,6 +81,7 @@ impl Stage {
             StageKind::LightStageLights => {
                 light_stage(recipe, seed, &viewpoints()[24..25], &LIGHTS_DEG)
             }
+            StageKind::LightStage => light_stage(recipe, seed, &viewpoints(), &LIGHTS_DEG),
             StageKind::MultiLane => multi_lane(recipe, seed),
             StageKind::MultiIllumination => multi_illumination(recipe, seed),
         }

@@ -8,7 +8,7 @@ use crate::{
     geometry::Geometry,
     light::Light,
     material::{Material, Roads, rgb},
-    parts::{Grove, Lot, Species, StreetKit, Style, hide_behind, house},
+    parts::{Grove, Lot, OUTDOORS, Species, StreetKit, Style, hide_behind, house},
     recipe::{Offset, Recipe, Refusal, Traverse, between, count},
     scene::{Draft, Scene},
     seed::Seed,
@@ -22,6 +22,15 @@ pub struct Street {
     pub avenues: usize,
     /// Distance between places, metres.
     pub spacing_m: f64,
+    /// How unevenly the places lie: the drive is slower and faster by this share in turn, below 1.
+    #[serde(skip_serializing_if = "is_even")]
+    pub uneven: f64,
+    /// Distance between cross streets, metres.
+    #[serde(skip_serializing_if = "is_usual_block")]
+    pub block_m: f64,
+    /// Width of the roads between their kerbs, metres.
+    #[serde(skip_serializing_if = "is_usual_road")]
+    pub road_m: f64,
     /// How many kinds of houses there are.
     pub styles: usize,
     /// How many places share a look where `aliasing` has its way: 1 none.
@@ -56,6 +65,9 @@ impl Default for Street {
         Self {
             avenues: 3,
             spacing_m: 6.0,
+            uneven: 0.0,
+            block_m: BLOCK,
+            road_m: ROAD,
             styles: 10,
             look_alikes: 1,
             aliasing: 0.0,
@@ -67,14 +79,34 @@ impl Default for Street {
     }
 }
 
-/// Distance between avenues and between cross streets.
-const PERIOD: Vec2 = Vec2::new(68.0, 92.0);
-/// Half the width between kerbs.
-const ROAD: f32 = 5.6;
+/// Distance between avenues, metres.
+const AVENUES: f32 = 68.0;
+/// Usual distance between cross streets.
+const BLOCK: f64 = 92.0;
+/// Usual width between kerbs.
+const ROAD: f64 = 11.2;
 const SIDEWALK: f32 = 3.2;
 const KERB: f32 = 0.13;
 /// Blocks beyond the route on all sides.
 const MARGIN: i64 = 2;
+/// Places from one slow stretch of an uneven drive to the next.
+const SLOW_EVERY: f64 = 24.0;
+
+// Keys that came later are only written where they differ: recipes without them keep their folders.
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls these")]
+fn is_even(uneven: &f64) -> bool {
+    *uneven == 0.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls these")]
+fn is_usual_block(block: &f64) -> bool {
+    *block == BLOCK
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls these")]
+fn is_usual_road(road: &f64) -> bool {
+    *road == ROAD
+}
 
 impl Street {
     pub(crate) fn check(&self) -> Result<(), Refusal> {
@@ -82,6 +114,9 @@ impl Street {
         count("street.styles", self.styles, 1, 200)?;
         count("street.look_alikes", self.look_alikes, 1, 1_000)?;
         between("street.spacing_m", self.spacing_m, 0.2, 200.0)?;
+        between("street.uneven", self.uneven, 0.0, 0.95)?;
+        between("street.block_m", self.block_m, 60.0, 400.0)?;
+        between("street.road_m", self.road_m, 9.0, 20.0)?;
         between("street.aliasing", self.aliasing, 0.0, 1.0)?;
         between("street.trees", self.trees, 0.0, 1.0)?;
         between("street.eye_m", self.eye_m, 0.3, 6.0)?;
@@ -100,7 +135,7 @@ impl Street {
         let (second, kit) = city.build(&recipe.queries, 1);
         let (references, queries) = two_traverses(recipe, &route, seed, |pose, own| {
             let share = recipe.queries.condition.occlusion;
-            hide_behind(&kit, pose, &recipe.camera, share, own)
+            hide_behind(&kit, (pose, &recipe.camera), share, OUTDOORS, own)
         });
         let lights = vec![
             Light::new(&recipe.references.condition, seed.named("first light")),
@@ -113,6 +148,36 @@ impl Street {
             references,
             queries,
             grid,
+            world_from_scene: vpr_core::Pose::identity(),
+        }
+    }
+
+    /// One shot per place and visit, place by place; every visit has a scene and a light.
+    pub(crate) fn tour(&self, recipe: &Recipe, visits: &[Traverse], seed: Seed) -> Plan {
+        let route = self.route(recipe);
+        let city = City::new(self, recipe.places, seed);
+        let (mut scenes, mut lights, mut drives) = (Vec::new(), Vec::new(), Vec::new());
+        for (number, visit) in (0_i64..).zip(visits) {
+            let own = seed.named("visit").at(number);
+            let (scene, kit) = city.build(visit, number);
+            let mut shots = drive(recipe, visit, &route[..recipe.places], scenes.len(), own);
+            for shot in &mut shots {
+                let share = visit.condition.occlusion;
+                let view = (&shot.pose, &recipe.camera);
+                shot.foreground = hide_behind(&kit, view, share, OUTDOORS, shot.seed);
+            }
+            scenes.push(scene);
+            lights.push(Light::new(&visit.condition, own.named("light")));
+            drives.push(shots.into_iter());
+        }
+        let place_by_place = (0..recipe.places)
+            .flat_map(|_| drives.iter_mut().filter_map(Iterator::next).collect::<Vec<_>>());
+        Plan {
+            references: place_by_place.collect(),
+            scenes,
+            lights,
+            queries: Vec::new(),
+            grid: Vec::new(),
             world_from_scene: vpr_core::Pose::identity(),
         }
     }
@@ -140,11 +205,25 @@ impl Street {
         (0..n)
             .map(|place| {
                 let (avenue, along) = (place / per_avenue, place % per_avenue);
-                let x = avenue as f32 * PERIOD.x + 1.7;
-                let y = along as f64 * self.spacing_m + 3.0;
+                let x = avenue as f32 * AVENUES + 1.7;
+                let y = self.along(along) + 3.0;
                 level_pose(Vec3::new(x, y as f32, self.eye_m as f32), heading)
             })
             .collect()
+    }
+
+    /// Metres along an avenue at which a place lies.
+    fn along(&self, place: usize) -> f64 {
+        let even = place as f64 * self.spacing_m;
+        if self.uneven == 0.0 {
+            return even;
+        }
+        let turn = std::f64::consts::TAU / SLOW_EVERY;
+        even + self.uneven * self.spacing_m * libm::sin(turn * place as f64) / turn
+    }
+
+    fn period(&self) -> Vec2 {
+        Vec2::new(AVENUES, self.block_m as f32)
     }
 
     fn per_avenue(&self, places: usize) -> usize {
@@ -167,7 +246,7 @@ impl<'a> City<'a> {
     fn new(street: &'a Street, places: usize, seed: Seed) -> Self {
         let per_avenue = street.per_avenue(places);
         let length = per_avenue as f64 * street.spacing_m;
-        let blocks = (length / f64::from(PERIOD.y)).ceil() as i64;
+        let blocks = (length / street.block_m).ceil() as i64;
         let cycle = (blocks / street.look_alikes as i64).max(1);
         let styles =
             (0..street.styles as i64).map(|k| Style::new(seed.named("style").at(k))).collect();
@@ -195,7 +274,8 @@ impl<'a> City<'a> {
         let kit = StreetKit::new(&mut draft, self.seed.named("kit"));
         let grove =
             Grove::new(&mut draft, self.seed.named("grove"), traverse.condition.bare as f32);
-        let roads = draft.material(Material::Roads(Roads { period: PERIOD, half_width: ROAD }));
+        let (period, road) = (self.street.period(), 0.5 * self.street.road_m as f32);
+        let roads = draft.material(Material::Roads(Roads { period, half_width: road }));
         let pavement = draft.material(Material::Pavement { colour: rgb(150, 147, 140) });
         let meadow = draft.material(Material::Meadow { colour: rgb(86, 112, 52) });
         let far = Vec3::new(-3_000.0, -3_000.0, -0.06);
@@ -205,10 +285,10 @@ impl<'a> City<'a> {
             Block { city: self, kit: &kit, grove: &grove, traverse, number, pavement, meadow };
         for avenue in -MARGIN..self.avenues + MARGIN {
             for block in -self.beyond()..self.blocks + self.beyond() {
-                let corner = Vec2::new(avenue as f32, block as f32) * PERIOD;
-                let low = (corner - Vec2::splat(ROAD + 30.0)).extend(0.0);
+                let corner = Vec2::new(avenue as f32, block as f32) * period;
+                let low = (corner - Vec2::splat(road + 30.0)).extend(0.0);
                 let road =
-                    Geometry::Patch { corner: low, u: Vec3::X * PERIOD.x, v: Vec3::Y * PERIOD.y };
+                    Geometry::Patch { corner: low, u: Vec3::X * period.x, v: Vec3::Y * period.y };
                 draft.add(road, roads, self.look(avenue, block, 0).bits());
                 builder.build(&mut draft, avenue, block);
             }
@@ -230,9 +310,11 @@ struct Block<'a> {
 
 impl Block<'_> {
     fn build(&self, draft: &mut Draft, avenue: i64, block: i64) {
-        let corner = Vec2::new(avenue as f32, block as f32) * PERIOD;
-        let low = (corner + Vec2::splat(ROAD)).extend(-0.2);
-        let high = (corner + PERIOD - Vec2::splat(ROAD)).extend(KERB);
+        let (period, road) =
+            (self.city.street.period(), Vec2::splat(0.5 * self.city.street.road_m as f32));
+        let corner = Vec2::new(avenue as f32, block as f32) * period;
+        let low = (corner + road).extend(-0.2);
+        let high = (corner + period - road).extend(KERB);
         draft.add(
             Geometry::span(low, high),
             self.pavement,

@@ -8,6 +8,6 @@ mod tree;
 
 pub(crate) use furniture::{Furnisher, Room, shell};
 pub(crate) use house::{Lot, Style, house};
-pub(crate) use street_things::{StreetKit, hide_behind};
+pub(crate) use street_things::{INDOORS, OUTDOORS, StreetKit, hide_behind};
 pub(crate) use toys::toy_town;
 pub(crate) use tree::{Grove, Species};

@@ -217,6 +217,11 @@ impl StreetKit {
 /// In how many columns the view is cut for lorries to stand in.
 const COLUMNS: usize = 8;
 
+/// How far before the camera the things stand that hide the view, metres.
+pub(crate) const OUTDOORS: f64 = 3.0;
+/// The same between walls.
+pub(crate) const INDOORS: f64 = 0.6;
+
 /// Lorries, and people before them, right in front of a camera until `share` of its view's width
 /// is hidden.
 ///
@@ -224,9 +229,9 @@ const COLUMNS: usize = 8;
 /// to the top, so the share is exact up to half a column of [`COLUMNS`].
 pub(crate) fn hide_behind(
     kit: &StreetKit,
-    pose: &vpr_core::Pose,
-    camera: &crate::Camera,
+    (pose, camera): (&vpr_core::Pose, &crate::Camera),
     share: f64,
+    depth: f64,
     seed: Seed,
 ) -> Vec<Shape> {
     let mut order: Vec<usize> = (0..COLUMNS).collect();
@@ -243,7 +248,6 @@ pub(crate) fn hide_behind(
             let there = pose * nalgebra::Point3::new(aside, 0.0, depth);
             Vec3::new(there.x as f32, there.y as f32, pose.translation.z as f32 - 1.55)
         };
-        let depth = 3.0;
         let wide = (2.0 * half * depth / COLUMNS as f64) as f32;
         let turn = across.normalize_or(Vec2::X);
         let side = Geometry::Block {
@@ -253,7 +257,7 @@ pub(crate) fn hide_behind(
         };
         let material = kit.cars[own.at(5).index(kit.cars.len())];
         shapes.push(Shape { geometry: side, material, seed: own.bits(), moving: true });
-        kit.body(&mut shapes, at(2.2), across, own);
+        kit.body(&mut shapes, at(depth * 2.2 / 3.0), across, own);
     }
     shapes
 }

@@ -1,0 +1,96 @@
+//! Whatever happens to a render, later runs trust complete worlds only.
+#![cfg(all(feature = "cli", unix))]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Stdio},
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+const WORLD: [&str; 10] = [
+    "render",
+    "world/campus",
+    "--set",
+    "places=8",
+    "--set",
+    "camera.width=96",
+    "--set",
+    "camera.height=72",
+    "--set",
+    "depth=true",
+];
+
+fn render(cache: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_worlds"));
+    command.args(WORLD).arg("--cache").arg(cache).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// The stamp of the world that a render prints.
+fn stamp(cache: &Path) -> String {
+    let output = render(cache).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let folder = String::from_utf8(output.stdout).unwrap();
+    fs::read_to_string(Path::new(folder.trim()).join("world.json")).unwrap()
+}
+
+fn folders(cache: &Path) -> Vec<String> {
+    let entries = fs::read_dir(cache).unwrap();
+    entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect()
+}
+
+#[test]
+fn a_render_killed_at_any_moment_leaves_nothing_that_is_trusted() {
+    let clean = tempfile::tempdir().unwrap();
+    let begun = Instant::now();
+    let expected = stamp(clean.path());
+    let whole = begun.elapsed();
+    let mut n_killed = 0;
+    for moment in 0..12 {
+        let cache = tempfile::tempdir().unwrap();
+        let mut child = render(cache.path()).spawn().unwrap();
+        // From the first to the last moment, the later ones during and after the renaming.
+        sleep(whole * moment / 10);
+        child.kill().unwrap();
+        n_killed += usize::from(!child.wait().unwrap().success());
+        for name in folders(cache.path()) {
+            let is_partial = name.starts_with(".partial-");
+            assert!(is_partial || cache.path().join(&name).join("world.json").exists(), "{name}");
+        }
+        assert_eq!(stamp(cache.path()), expected, "killed after {moment} tenths");
+    }
+    assert!(n_killed >= 3, "only {n_killed} of 12 renders were killed in time");
+}
+
+#[test]
+fn a_full_disk_is_an_error_that_names_the_file_and_leaves_no_world() {
+    let cache = tempfile::tempdir().unwrap();
+    // Files end after two blocks of 1024 bytes, as on a disk that is full.
+    let script = "trap '' XFSZ; ulimit -f 2; exec \"$0\" \"$@\"";
+    let mut command = Command::new("bash");
+    command.args(["-c", script, env!("CARGO_BIN_EXE_worlds")]).args(WORLD);
+    let output = command.arg("--cache").arg(cache.path()).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains(".jpg") || message.contains(".png"), "{message}");
+    assert!(output.stdout.is_empty());
+    assert!(folders(cache.path()).is_empty(), "{:?}", folders(cache.path()));
+    assert!(stamp(cache.path()).contains("generated"));
+}
+
+#[test]
+fn what_a_killed_render_left_long_ago_is_removed() {
+    let cache = tempfile::tempdir().unwrap();
+    let old = cache.path().join(".partial-old");
+    fs::create_dir(&old).unwrap();
+    let now = std::time::SystemTime::now();
+    let day_before_yesterday = now - Duration::from_hours(48);
+    fs::File::open(&old).unwrap().set_modified(day_before_yesterday).unwrap();
+    let recent = cache.path().join(".partial-recent");
+    fs::create_dir(&recent).unwrap();
+    stamp(cache.path());
+    assert!(!old.exists() && recent.exists());
+}
