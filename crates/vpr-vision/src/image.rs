@@ -79,6 +79,35 @@ pub fn probe(path: &Path) -> Result<ImageSize> {
     Ok(ImageSize { width: width as usize, height: height as usize })
 }
 
+/// Writes a PNG file; an existing file is replaced only when the new one is complete.
+///
+/// # Errors
+///
+/// [`Error::Io`] if the file cannot be written, [`Error::Format`] if the image has no pixels.
+pub fn write_png(image: &RgbImage, path: &Path) -> Result<()> {
+    let refuse = |reason: image::ImageError| Error::format(path, "pixels", reason.to_string());
+    let side = |len: usize| u32::try_from(len).unwrap_or(u32::MAX);
+    let (width, height) = (side(image.width()), side(image.height()));
+    let mut bytes = Cursor::new(Vec::new());
+    let (pixels, color) = (image.as_slice(), image::ExtendedColorType::Rgb8);
+    image::write_buffer_with_format(
+        &mut bytes,
+        pixels,
+        width,
+        height,
+        color,
+        image::ImageFormat::Png,
+    )
+    .map_err(refuse)?;
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    let written = fs::write(&partial, bytes.into_inner()).and_then(|()| fs::rename(&partial, path));
+    written.map_err(|reason| {
+        let _ = fs::remove_file(&partial);
+        Error::io(path)(reason)
+    })
+}
+
 /// Luma by ITU-R BT.601 in OpenCV's 15-bit fixed point: `(9798 R + 19235 G + 3735 B + 16384) >> 15`.
 #[must_use]
 pub fn gray(image: &RgbImage) -> GrayImage {
@@ -245,6 +274,17 @@ mod tests {
             assert_eq!(probe(&path).unwrap(), decode(&path).unwrap().size());
         }
         Ok(())
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("noise.png");
+        write_png(&noise(53, 37), &path).unwrap();
+        assert_eq!(decode(&path).unwrap().as_slice(), noise(53, 37).as_slice());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+        let nowhere = folder.path().join("no/such/folder.png");
+        assert!(matches!(write_png(&noise(2, 2), &nowhere), Err(Error::Io { .. })));
     }
 
     #[test]
