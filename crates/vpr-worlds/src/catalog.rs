@@ -145,6 +145,9 @@ mod tests {
                 .unwrap();
             assert!(err.contains(last), "{key} = {value}: {err}");
         }
+        let frames = [("tolerance", "{ frames = 1 }")];
+        let err = recipe_with("street", &frames).unwrap_err().to_string();
+        assert!(err.contains("tolerance.frames"), "{err}");
         let err = recipe_with("street", &[("rail.woods", "0.5")]).unwrap_err().to_string();
         assert!(err.contains("2 families"), "{err}");
         assert!(recipe("strete").unwrap_err().to_string().contains("known: street,"));

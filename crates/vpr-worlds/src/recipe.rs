@@ -190,6 +190,19 @@ impl Recipe {
         crate::catalog::set(&text, path, settings)
     }
 
+    /// The steps of a route with this distance between them at which images are taken: the places,
+    /// then, far enough from them that no reference is correct, the new ones.
+    pub(crate) fn steps(&self, spacing_m: f64) -> Vec<usize> {
+        let gap = match self.tolerance {
+            Tolerance::RadiusM(radius) if self.new_places > 0 => {
+                (radius / spacing_m).ceil() as usize + 4
+            }
+            _ => 0,
+        };
+        let new = self.places + gap..self.places + gap + self.new_places;
+        (0..self.places).chain(new).collect()
+    }
+
     /// Lets rooms be seen along the published camera paths of 7-Scenes where a data folder has
     /// them (`7scenes/poses`); recipes that name a folder themselves, and all others, stay as they
     /// are.
@@ -222,6 +235,14 @@ impl Recipe {
         }
         if let Tolerance::RadiusM(radius) = self.tolerance {
             between("tolerance.radius_m", radius, 0.0, 10_000.0)?;
+        }
+        if matches!(self.tolerance, Tolerance::Frames(_)) && self.layout != Layout::VprBench {
+            let reason = "only the layout vpr-bench has a file for frames; give radius_m";
+            return Err(Refusal { key: "tolerance.frames", reason: reason.to_owned() });
+        }
+        if self.new_places > 0 && self.stage.is_some() {
+            let reason = "a stage has a second place already";
+            return Err(Refusal { key: "new_places", reason: reason.to_owned() });
         }
         for traverse in [&self.references, &self.queries] {
             traverse.check()?;

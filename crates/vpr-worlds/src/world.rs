@@ -25,7 +25,7 @@ use crate::{
 };
 
 /// Changes with every change of the bytes that any recipe gives; part of the folder's name.
-pub const RENDERER: u32 = 4;
+pub const RENDERER: u32 = 5;
 
 /// Quality of JPEG files.
 const QUALITY: u8 = 92;

@@ -4,7 +4,7 @@
 
 use std::{fs, path::Path};
 
-use vpr_worlds::{Recipe, World, recipe_with};
+use vpr_worlds::{Recipe, Scenery, Side, World, recipe_with};
 
 fn small(name: &str) -> Recipe {
     let settings = [
@@ -113,6 +113,25 @@ fn new_places_have_nothing_correct() {
     let truth = render(&recipe, cache.path()).dataset.truth;
     assert_eq!((truth.len(), truth.n_known()), (7, 4));
     assert!((4..7).all(|query| truth.is_new_place(query)));
+}
+
+#[test]
+fn new_places_come_on_request_in_every_family() {
+    let radius = [("layout", "\"seven-scenes\""), ("tolerance", "{ radius_m = 5.0 }")];
+    for name in ["street", "street-st-lucia", "rail", "campus", "corridor", "seven-scenes-heads"] {
+        let mut settings = radius.to_vec();
+        settings.extend([("places", "6"), ("query_every", "1"), ("new_places", "4")]);
+        settings.extend([("camera", "{ width = 16, height = 16, focal = 12.0 }")]);
+        let scenery = Scenery::new(&recipe_with(name, &settings).unwrap()).unwrap();
+        let truth = scenery.ground_truth();
+        assert_eq!((truth.len(), truth.n_known()), (10, 6), "{name}");
+        for query in 6..10 {
+            assert_eq!(scenery.place(Side::Queries, query), None);
+            assert!(truth.is_new_place(query), "{name}, query {query}");
+        }
+    }
+    let err = recipe_with("multi-lane", &[("new_places", "1")]).unwrap_err().to_string();
+    assert!(err.contains("new_places"), "{err}");
 }
 
 #[test]

@@ -49,8 +49,10 @@ impl Campus {
     }
 
     pub(crate) fn plan(&self, recipe: &Recipe, seed: Seed) -> Plan {
-        let n = recipe.places + recipe.new_places;
-        let route: Vec<_> = (0..n)
+        let steps = recipe.steps(self.spacing_m);
+        let n = steps.last().map_or(0, |last| last + 1);
+        let route: Vec<_> = steps
+            .into_iter()
             .map(|place| {
                 let y = (place as f64 * self.spacing_m) as f32 + 4.0;
                 level_pose(Vec3::new(0.0, y, self.eye_m as f32), std::f64::consts::FRAC_PI_2)

@@ -78,8 +78,9 @@ impl Interior {
     }
 
     pub(crate) fn plan(&self, recipe: &Recipe, seed: Seed) -> Plan {
-        let n = recipe.places + recipe.new_places;
-        let route: Vec<_> = (0..n).map(|place| self.pose(place, seed)).collect();
+        let steps = recipe.steps(self.spacing_m);
+        let n = steps.last().map_or(0, |last| last + 1);
+        let route: Vec<_> = steps.into_iter().map(|place| self.pose(place, seed)).collect();
         let build = |traverse: &Traverse, number: i64| {
             let mut draft = Draft::default();
             let furnisher = Furnisher::new(&mut draft, seed.named("furnisher"));

@@ -69,9 +69,11 @@ impl Rail {
     }
 
     pub(crate) fn plan(&self, recipe: &Recipe, seed: Seed) -> Plan {
-        let n = recipe.places + recipe.new_places;
+        let steps = recipe.steps(self.spacing_m);
+        let n = steps.last().map_or(0, |last| last + 1);
         let line = Line { rail: self, length: n as f32 * self.spacing_m as f32, seed };
-        let route: Vec<_> = (0..n)
+        let route: Vec<_> = steps
+            .into_iter()
             .map(|place| {
                 let y = (place as f64 * self.spacing_m) as f32 + 2.0;
                 let heading = std::f64::consts::FRAC_PI_2 - f64::from(libm::atanf(slope(y)));

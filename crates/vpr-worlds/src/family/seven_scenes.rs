@@ -76,7 +76,8 @@ impl SevenScenes {
             poses.iter().map(|pose| scene_from_world * pose).collect()
         };
         let (train, test) = (within(&train), within(&test));
-        let scenes = vec![
+        let elsewhere = elsewhere(recipe, seed.named("elsewhere"));
+        let mut scenes = vec![
             build(&train, &test, &recipe.references, seed, 0),
             build(&train, &test, &recipe.queries, seed, 1),
         ];
@@ -84,15 +85,28 @@ impl SevenScenes {
             Light::indoors(&recipe.references.condition, seed.named("first light")),
             Light::indoors(&recipe.queries.condition, seed.named("second light")),
         ];
+        let mut queries = shots(recipe, &recipe.queries, &test, 1, seed.named("queries"));
+        if !elsewhere.is_empty() {
+            let own = seed.named("elsewhere");
+            let new = shots(recipe, &recipe.queries, &elsewhere, 1, own.named("queries"));
+            queries.extend(new.into_iter().map(|shot| Shot { scene: 2, place: None, ..shot }));
+            scenes.push(build(&elsewhere, &[], &recipe.queries, own, 1));
+        }
         Ok(Plan {
             scenes,
             lights,
             references: shots(recipe, &recipe.references, &train, 0, seed.named("references")),
-            queries: shots(recipe, &recipe.queries, &test, 1, seed.named("queries")),
+            queries,
             grid: Vec::new(),
             world_from_scene: scene_from_world.inverse(),
         })
     }
+}
+
+/// Poses of the new places: in another room, a kilometre away.
+fn elsewhere(recipe: &Recipe, seed: Seed) -> Vec<vpr_core::Pose> {
+    let away = Translation3::new(1_000.0, 0.0, 0.0);
+    hand_held(recipe.new_places, seed).into_iter().map(|pose| away * pose).collect()
 }
 
 /// A room around all cameras, with 1.6 m between them and the walls.

@@ -130,7 +130,11 @@ impl Street {
 
     pub(crate) fn plan(&self, recipe: &Recipe, seed: Seed) -> Plan {
         let route = self.route(recipe);
-        let city = City::new(self, recipe.places + recipe.new_places, seed);
+        let last = recipe.steps(self.slowest_m()).last().copied().unwrap_or_default();
+        let mut city = City::new(self, last + 1, seed);
+        // New places may lie on avenues of their own.
+        let last_avenue = (last / self.per_avenue(recipe.places)) as i64;
+        city.avenues = city.avenues.max(last_avenue + 1 - MARGIN);
         let (first, _) = city.build(&recipe.references, 0);
         let (second, kit) = city.build(&recipe.queries, 1);
         let (references, queries) = two_traverses(recipe, &route, seed, |pose, own| {
@@ -199,10 +203,11 @@ impl Street {
 
     /// Level poses in the middle of the right lane.
     fn route(&self, recipe: &Recipe) -> Vec<vpr_core::Pose> {
-        let n = recipe.places + recipe.new_places;
         let per_avenue = self.per_avenue(recipe.places);
         let heading = (90.0 + self.heading_deg).to_radians();
-        (0..n)
+        recipe
+            .steps(self.slowest_m())
+            .into_iter()
             .map(|place| {
                 let (avenue, along) = (place / per_avenue, place % per_avenue);
                 let x = avenue as f32 * AVENUES + 1.7;
@@ -220,6 +225,11 @@ impl Street {
         }
         let turn = std::f64::consts::TAU / SLOW_EVERY;
         even + self.uneven * self.spacing_m * libm::sin(turn * place as f64) / turn
+    }
+
+    /// Smallest distance between places.
+    fn slowest_m(&self) -> f64 {
+        self.spacing_m * (1.0 - self.uneven)
     }
 
     fn period(&self) -> Vec2 {

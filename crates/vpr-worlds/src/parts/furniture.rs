@@ -55,7 +55,7 @@ impl Niche {
 /// Floor, ceiling and four walls.
 pub(crate) fn shell(draft: &mut Draft, room: &Room, seed: Seed) {
     let Room { low, high } = *room;
-    let tone = hue(seed.at(0).unit(), seed.at(1).range(0.03, 0.25), seed.at(2).range(0.7, 0.95));
+    let tone = hue(seed.at(0).unit(), seed.at(1).range(0.02, 0.14), seed.at(2).range(0.7, 0.95));
     let kind = seed.at(3).pick(&[
         Wall::Plaster,
         Wall::Plaster,
