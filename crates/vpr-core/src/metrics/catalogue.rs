@@ -251,6 +251,14 @@ pub const CATALOGUE: &[MetricInfo] = &[
     },
     MetricInfo { id: "accuracy", name: "Accuracy", functions: &["accuracy"], ..PLAIN },
     MetricInfo {
+        id: "aurc",
+        name: "AURC, excess AURC",
+        usage: LOCALISATION,
+        audience: Audience::Robotics,
+        functions: &["aurc", "excess_aurc", "risk_coverage_curve", "base_risk"],
+        ..PLAIN
+    },
+    MetricInfo {
         id: "true-positive-spacing",
         name: "True-positive distribution",
         usage: LOCALISATION,
@@ -306,6 +314,7 @@ mod tests {
         include_str!("platform.rs"),
         include_str!("recall.rs"),
         include_str!("roc.rs"),
+        include_str!("selective.rs"),
         include_str!("spacing.rs"),
     ];
 

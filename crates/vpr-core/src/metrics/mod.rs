@@ -35,6 +35,7 @@ mod operating_point;
 mod platform;
 mod recall;
 mod roc;
+mod selective;
 mod spacing;
 
 pub use area::auc;
@@ -48,4 +49,5 @@ pub use operating_point::{
 pub use platform::{SearchCost, Timing, required_fps, retrieval_time, speed_limit};
 pub use recall::{PUBLISHED_RECALL_RANGE, recall_at, recall_curve};
 pub use roc::{RocCurve, auc_roc, roc_curve, roc_positives};
+pub use selective::{RiskCoverage, aurc, base_risk, excess_aurc, risk_coverage_curve};
 pub use spacing::true_positive_spacing;

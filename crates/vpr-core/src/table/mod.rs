@@ -12,6 +12,11 @@ pub use check::{Finding, check};
 pub use page::{csv_page, markdown_page, read_csv};
 pub use render::Format;
 
+/// What separates a remark from the interval behind it; only the remark is a footnote of a page.
+const REMARK_END: &str = "; ";
+/// How an interval in a note begins.
+const INTERVAL: &str = "95 % interval ";
+
 /// Where a number comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -154,10 +159,10 @@ impl Cell {
     /// Says how sure the value is, in the note; shown in CSV and JSON.
     #[must_use]
     pub fn within(mut self, low: f64, high: f64, method: &str) -> Self {
-        let interval = format!("95 % interval {low:.4} to {high:.4} ({method})");
+        let interval = format!("{INTERVAL}{low:.4} to {high:.4} ({method})");
         self.quiet = self.note.is_none();
         self.note = Some(match self.note {
-            Some(note) => format!("{note}; {interval}"),
+            Some(note) => format!("{note}{REMARK_END}{interval}"),
             None => interval,
         });
         self

@@ -3,7 +3,7 @@
 use comfy_table::{Table as Grid, TableStyle, presets};
 use serde::{Deserialize, Serialize};
 
-use super::{Cell, Provenance, Table, Value};
+use super::{Cell, INTERVAL, Provenance, REMARK_END, Table, Value};
 
 /// How a table is printed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -149,6 +149,7 @@ fn entry<'a>(table: &Table, cell: &'a Cell, notes: &mut Vec<&'a str>) -> String 
         None => "",
     };
     let note = cell.note.as_deref().filter(|_| !cell.quiet).map_or_else(String::new, |note| {
+        let note = note.split(&format!("{REMARK_END}{INTERVAL}")).next().unwrap_or(note);
         let known = notes.iter().position(|it| *it == note);
         let index = known.unwrap_or_else(|| {
             notes.push(note);
@@ -198,6 +199,18 @@ mod tests {
          Nordland  absent                 absent [1]  absent [1]
         [1] Nordland: not at hand
         ");
+    }
+
+    #[test]
+    fn a_footnote_is_the_remark_without_the_interval() {
+        let mut table = Table::new("table-0", "t");
+        for (column, low) in [("HOG", 0.4), ("CALC", 0.45)] {
+            let cell = Cell::new("Corridor", column, 0.5, Provenance::Measured, 9);
+            table.push(cell.noted("within chance").within(low, 0.6, "bootstrap"));
+        }
+        let text = table.render(Format::Table);
+        assert!(text.ends_with("[1] within chance\n"), "{text}");
+        assert!(table.render(Format::Csv).contains("within chance; 95 % interval 0.4500 to"));
     }
 
     #[test]

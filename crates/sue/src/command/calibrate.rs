@@ -1,0 +1,76 @@
+//! `sue calibrate`: a threshold with a promise, in words or as JSON.
+
+use clap::ValueEnum;
+use sue::{
+    EstimatorChoice,
+    calibrate::{PrecisionGoal, Scope, calibrate_false_acceptance, calibrate_precision},
+    evaluate::Judged,
+};
+use vpr_core::cli::{self, Outcome};
+
+use super::{input::InputArgs, truth::TruthArgs};
+
+/// The promise, and the queries it rests on.
+#[derive(clap::Args)]
+pub(crate) struct CalibrateArgs {
+    /// Which estimator
+    #[arg(long, value_enum, default_value_t = EstimatorChoice::Sue, value_name = "NAME")]
+    estimator: EstimatorChoice,
+    /// Share of accepted matches that must be correct
+    #[arg(long, default_value_t = 0.95, value_name = "P")]
+    precision: f64,
+    /// Chance that the promise is broken
+    #[arg(long, default_value_t = 0.1, value_name = "R")]
+    risk: f64,
+    /// Whose precision is promised
+    #[arg(long, value_enum, default_value_t = ScopeChoice::Population)]
+    scope: ScopeChoice,
+    /// Instead of a precision: largest chance that a wrong match is accepted
+    #[arg(long, value_name = "RATE", conflicts_with_all = ["precision", "risk", "scope"])]
+    false_acceptance: Option<f64>,
+    #[command(flatten)]
+    input: InputArgs,
+    #[command(flatten)]
+    truth: TruthArgs,
+    /// Print one JSON object instead of a sentence
+    #[arg(long)]
+    json: bool,
+}
+
+/// Whose precision is promised.
+#[derive(Clone, Copy, ValueEnum)]
+enum ScopeChoice {
+    /// Of all queries there could be
+    Population,
+    /// Of the next accepted matches, as many as in calibration
+    NextBatch,
+}
+
+pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
+    let input = args.input.open()?;
+    let truth = args.truth.truth(&input)?;
+    let retrieval = input.retrieve()?;
+    let judged = Judged::new(&retrieval.best(), &truth)?;
+    let prepared = args.estimator.prepare(&input.settings, input.poses.as_ref())?;
+    let uncertainty = prepared.estimate(&retrieval)?;
+    let (words, object) = if let Some(rate) = args.false_acceptance {
+        let result = calibrate_false_acceptance(&uncertainty, judged.correct(), rate)?;
+        (result.to_string(), serde_json::to_value(result)?)
+    } else {
+        let scope = match args.scope {
+            ScopeChoice::Population => Scope::Population,
+            ScopeChoice::NextBatch => Scope::NextBatch,
+        };
+        let goal = PrecisionGoal { precision: args.precision, risk: args.risk, scope };
+        let result = calibrate_precision(&uncertainty, judged.correct(), goal)?;
+        (result.to_string(), serde_json::to_value(result)?)
+    };
+    if args.json {
+        let mut object = object;
+        object["guarantee"] = words.into();
+        cli::print(&format!("{object:#}\n"))?;
+    } else {
+        cli::print(&format!("{words}\n"))?;
+    }
+    Ok(Outcome::Success)
+}

@@ -1,0 +1,160 @@
+//! `sue estimate`: one uncertainty per query, as soon as its batch is done.
+
+use std::{fmt::Write as _, path::PathBuf};
+
+use anyhow::{bail, ensure};
+use clap::ValueEnum;
+use sue::{EstimatorChoice, Threshold, UncertaintyEstimator as _, Variance, Variances};
+use vpr_core::{
+    Retrieval,
+    cli::{self, Outcome},
+    map::replace,
+    npy,
+};
+
+use super::input::{Input, InputArgs, name_of};
+
+/// Estimator, map, queries and output.
+#[derive(clap::Args)]
+pub(crate) struct EstimateArgs {
+    /// Which estimator
+    #[arg(long, value_enum, default_value_t = EstimatorChoice::Sue, value_name = "NAME")]
+    estimator: EstimatorChoice,
+    /// Variances that an encoder predicted with the queries' descriptors; their mean is the
+    /// uncertainty, instead of the estimator's
+    #[arg(long, value_name = "NPY", conflicts_with = "estimator")]
+    variances: Option<PathBuf>,
+    #[command(flatten)]
+    input: InputArgs,
+    /// Format of the output
+    #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
+    format: OutputFormat,
+    /// Also say whether each match is accepted: uncertainties below this are
+    #[arg(long, value_name = "U", allow_hyphen_values = true)]
+    threshold: Option<f64>,
+    /// Write there instead of stdout
+    #[arg(long, short, value_name = "PATH")]
+    out: Option<PathBuf>,
+}
+
+/// Formats of the output.
+#[derive(Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+enum OutputFormat {
+    /// One line per query
+    #[default]
+    Csv,
+    /// An array of objects
+    Json,
+    /// The uncertainties alone, f64; needs `--out`
+    Npy,
+}
+
+/// Collects or prints the text of finished batches.
+struct Sink {
+    text: String,
+    keep: bool,
+}
+
+impl Sink {
+    fn add(&mut self, text: &str) -> anyhow::Result<()> {
+        if self.keep {
+            self.text.push_str(text);
+            return Ok(());
+        }
+        cli::print(text)
+    }
+}
+
+pub(crate) fn run(args: &EstimateArgs) -> anyhow::Result<Outcome> {
+    let is_npy = args.format == OutputFormat::Npy;
+    ensure!(!is_npy || args.out.is_some(), "`--format npy` needs `--out`: it is no text");
+    let threshold = args.threshold.map(Threshold::below).transpose()?;
+    let input = args.input.open()?;
+    let variances = args.variances.as_deref().map(npy::read_f32).transpose()?;
+    if let (Some(variances), Some(path)) = (&variances, &args.variances) {
+        let (n, n_queries) = (variances.nrows(), input.n_queries());
+        ensure!(n == n_queries, "{}: {n} rows for {n_queries} queries", path.display());
+    }
+    let prepared = args.estimator.prepare(&input.settings, input.poses.as_ref())?;
+    let mut sink = Sink { text: String::new(), keep: args.out.is_some() };
+    let mut all = Vec::new();
+    sink.add(header(args.format, threshold))?;
+    input.each_batch(|first, retrieval| {
+        let uncertainty = match &variances {
+            Some(values) => {
+                let rows = values.slice(ndarray::s![first..first + retrieval.len(), ..]);
+                Variance::named("variance").estimate(&Variances::new(rows)?)?
+            }
+            None => prepared.estimate(retrieval)?,
+        };
+        if is_npy {
+            all.extend(&uncertainty);
+            return Ok(());
+        }
+        sink.add(&lines(args.format, &input, first, retrieval, &uncertainty, threshold))
+    })?;
+    sink.add(if args.format == OutputFormat::Json { "\n]\n" } else { "" })?;
+    match (&args.out, is_npy) {
+        (Some(path), true) => {
+            let column = ndarray::ArrayView2::from_shape((all.len(), 1), &all)?;
+            npy::write_f64(path, column)?;
+        }
+        (Some(path), false) => replace(path, sink.text.as_bytes())?,
+        (None, true) => bail!("`--format npy` needs `--out`"),
+        (None, false) => {}
+    }
+    Ok(Outcome::Success)
+}
+
+fn header(format: OutputFormat, threshold: Option<Threshold>) -> &'static str {
+    match (format, threshold) {
+        (OutputFormat::Csv, None) => "query,reference,distance,uncertainty\n",
+        (OutputFormat::Csv, Some(_)) => "query,reference,distance,uncertainty,accepted\n",
+        (OutputFormat::Json, _) => "[",
+        (OutputFormat::Npy, _) => "",
+    }
+}
+
+fn lines(
+    format: OutputFormat,
+    input: &Input,
+    first: usize,
+    retrieval: &Retrieval,
+    uncertainty: &[f64],
+    threshold: Option<Threshold>,
+) -> String {
+    let mut text = String::new();
+    for (row, &uncertainty) in uncertainty.iter().enumerate() {
+        let query = name_of(input.query_names.as_ref(), first + row);
+        let reference = name_of(input.names.as_ref(), retrieval.indices(row)[0]);
+        let distance = retrieval.distances(row)[0];
+        let accepted = threshold.map(|threshold| threshold.accepts(uncertainty));
+        if format == OutputFormat::Json {
+            let mut object = serde_json::json!({
+                "query": query, "reference": reference, "distance": distance,
+                "uncertainty": uncertainty,
+            });
+            if let Some(accepted) = accepted {
+                object["accepted"] = accepted.into();
+            }
+            let comma = if first + row == 0 { "" } else { "," };
+            let _ = write!(text, "{comma}\n{object}");
+        } else {
+            let _ =
+                write!(text, "{},{},{distance},{uncertainty}", quoted(&query), quoted(&reference));
+            if let Some(accepted) = accepted {
+                let _ = write!(text, ",{accepted}");
+            }
+            text.push('\n');
+        }
+    }
+    text
+}
+
+/// A field of a CSV line.
+fn quoted(field: &str) -> String {
+    if field.contains([',', '"', '\n', '\r']) {
+        return format!("\"{}\"", field.replace('"', "\"\""));
+    }
+    field.to_owned()
+}

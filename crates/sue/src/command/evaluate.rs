@@ -1,0 +1,111 @@
+//! `sue evaluate`: how well estimators tell correct from wrong matches.
+
+use sue::{
+    EstimatorChoice,
+    evaluate::{Evaluation, Judged},
+};
+use vpr_core::{
+    Definition,
+    cli::{self, Outcome},
+    metrics::bootstrap::{Interval, Resampling},
+    table::{Cell, Format, Provenance, Table},
+};
+
+use super::{input::InputArgs, truth::TruthArgs};
+
+/// Estimators, map, queries and their truth.
+#[derive(clap::Args)]
+pub(crate) struct EvaluateArgs {
+    /// Which estimators; the first is compared with each other one
+    #[arg(long, value_enum, num_args = 1.., value_name = "NAME",
+        default_values_t = [EstimatorChoice::Sue, EstimatorChoice::L2, EstimatorChoice::Pa])]
+    estimator: Vec<EstimatorChoice>,
+    #[command(flatten)]
+    input: InputArgs,
+    #[command(flatten)]
+    truth: TruthArgs,
+    /// Resamples of the bootstrap
+    #[arg(long, default_value_t = 2000, value_name = "N")]
+    resamples: usize,
+    /// Seed of the bootstrap
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Format on stdout
+    #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
+    format: Format,
+}
+
+pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
+    let input = args.input.open()?;
+    let truth = args.truth.truth(&input)?;
+    let retrieval = input.retrieve()?;
+    let judged = Judged::new(&retrieval.best(), &truth)?;
+    let resampling =
+        Resampling { n_resamples: args.resamples, seed: args.seed, ..Resampling::default() };
+    let title = format!(
+        "{} queries, base rate {:.4}: what accepting every match gives",
+        judged.len(),
+        judged.base_rate()
+    );
+    let mut table = Table::new("evaluation", title);
+    let mut first: Option<Evaluation<'_>> = None;
+    for choice in &args.estimator {
+        let prepared = choice.prepare(&input.settings, input.poses.as_ref())?;
+        let evaluation = Evaluation::new(&prepared.estimate(&retrieval)?, &judged)?;
+        push_summary(&mut table, prepared.name(), &evaluation, &resampling)?;
+        match &first {
+            None => first = Some(evaluation),
+            Some(first) => {
+                let difference = evaluation.auc_pr_difference(first, &resampling);
+                push(&mut table, prepared.name(), "AUC-PR minus first", difference, &judged)?;
+            }
+        }
+    }
+    cli::print(&table.render(args.format))?;
+    Ok(Outcome::Success)
+}
+
+fn push_summary(
+    table: &mut Table,
+    row: &str,
+    evaluation: &Evaluation<'_>,
+    resampling: &Resampling,
+) -> anyhow::Result<()> {
+    let judged = evaluation.judged();
+    for definition in [Definition::Published, Definition::Corrected] {
+        let column = format!("AUC-PR, {definition}");
+        let interval = evaluation.auc_pr_interval(definition, resampling);
+        push(table, row, &column, interval, judged)?;
+    }
+    let summary = evaluation.summary()?;
+    let values = [
+        ("AUC-ROC", summary.auc_roc),
+        ("AURC", Some(summary.aurc)),
+        ("excess AURC", Some(summary.excess_aurc)),
+        ("R@95%P", summary.recall_at_95_precision),
+    ];
+    for (column, value) in values {
+        let cell = Cell::new(row, column, 0.0, Provenance::Measured, judged.len());
+        table.push(Cell { value: value.map(Into::into), ..cell });
+    }
+    Ok(())
+}
+
+/// A value with its interval, or none and why.
+fn push(
+    table: &mut Table,
+    row: &str,
+    column: &str,
+    interval: sue::Result<Interval>,
+    judged: &Judged,
+) -> anyhow::Result<()> {
+    let cell = |value: f64| Cell::new(row, column, value, Provenance::Measured, judged.len());
+    table.push(match interval {
+        Ok(it) => cell(it.estimate).within(it.low, it.high, "bootstrap over queries"),
+        Err(sue::Error::Core(err @ vpr_core::Error::Undefined { .. })) => {
+            Cell { value: None, ..cell(0.0).noted(err.to_string()) }
+        }
+        Err(err) => return Err(err.into()),
+    });
+    Ok(())
+}

@@ -1,0 +1,262 @@
+//! The map and the queries that commands look at.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use sue::{DistanceKind, EstimatorSettings, Sue, SueParams};
+use vpr_core::{
+    Descriptors, Error, Poses, Retrieval,
+    knn::{self, Metric, RowSource, SearchParams},
+    map::{
+        About, Access, Names, OpenMap, Opening,
+        door::{self, Format, Parts},
+    },
+};
+
+/// Map and queries, and what the estimators are told.
+#[derive(clap::Args)]
+pub(crate) struct InputArgs {
+    /// Descriptors of the references: a map (file or growing folder), or any file `bench map` reads
+    #[arg(long, value_name = "PATH")]
+    map: PathBuf,
+    /// Poses of the references, if the map has none
+    #[arg(long, value_name = "PATH")]
+    map_poses: Option<PathBuf>,
+    /// Descriptors of the queries
+    #[arg(long, value_name = "PATH")]
+    queries: PathBuf,
+    /// Number of best references that spatial estimators look at
+    #[arg(short, long, default_value_t = 10, value_name = "K")]
+    k: usize,
+    /// Decay of the weights with distance
+    #[arg(long, default_value_t = 350.0, value_name = "L", allow_hyphen_values = true)]
+    lambda: f64,
+    /// Which distance decays
+    #[arg(long, value_enum, default_value_t = Decay::Squared)]
+    distance: Decay,
+    /// Differences of coordinates count at most this much, in metres
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    clip: Option<f64>,
+    /// Which neighbour in space measures the density of the map
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    nth: usize,
+    /// How many references are ranked, for estimators that look at similarities
+    #[arg(long, default_value_t = 50, value_name = "N")]
+    ranks: usize,
+    /// Queries at a time
+    #[arg(long, default_value_t = 1024, value_name = "N")]
+    batch_size: usize,
+}
+
+/// Which distance decays.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Decay {
+    /// Plain Euclidean distance, as thesis eq. 5.3
+    Euclidean,
+    /// Squared distance, as the released data
+    Squared,
+}
+
+/// Opened and checked against each other.
+pub(crate) struct Input {
+    references: Rows,
+    queries: Rows,
+    /// Poses of the references.
+    pub(crate) poses: Option<Poses>,
+    /// Names of the references.
+    pub(crate) names: Option<Names>,
+    /// Names of the queries.
+    pub(crate) query_names: Option<Names>,
+    /// Poses of the queries, if they came with them.
+    pub(crate) query_poses: Option<Poses>,
+    /// What the map says about itself.
+    pub(crate) about: About,
+    /// What the estimators are told.
+    pub(crate) settings: EstimatorSettings,
+    ranks: usize,
+    batch_size: usize,
+}
+
+/// Descriptors that stay on the disk, or are in memory.
+enum Rows {
+    Open(OpenMap),
+    Memory(Descriptors),
+}
+
+impl Rows {
+    fn source(&self) -> &dyn RowSource {
+        match self {
+            Self::Open(map) => map,
+            Self::Memory(rows) => rows,
+        }
+    }
+}
+
+/// One side as its file has it.
+struct Side {
+    rows: Rows,
+    names: Option<Names>,
+    poses: Option<Poses>,
+    about: About,
+}
+
+impl Side {
+    fn open(path: &Path) -> anyhow::Result<Self> {
+        let format = Format::guess(path)?;
+        if format == Format::Map {
+            let map = OpenMap::open(path, Opening { access: Access::Read, trust: false })?;
+            let (names, poses, about) = (map.names()?, map.poses()?, map.about().clone());
+            return Ok(Self { rows: Rows::Open(map), names, poses, about });
+        }
+        let Parts { names, descriptors, poses, about } = door::read(format, path)?;
+        let none = || Error::Empty("descriptors").in_file(path);
+        let rows = Rows::Memory(descriptors.ok_or_else(none)?);
+        Ok(Self { rows, names, poses, about })
+    }
+}
+
+impl InputArgs {
+    /// Opens both sides.
+    pub(crate) fn open(&self) -> anyhow::Result<Input> {
+        let references = Side::open(&self.map)?;
+        let queries = Side::open(&self.queries)?;
+        check(&references.about, &queries.about)?;
+        let mut about = references.about;
+        let mut poses = references.poses;
+        if let Some(path) = &self.map_poses {
+            let (joined, coordinates) =
+                poses_of(path, references.names.as_ref(), references.rows.source().len())?;
+            poses = Some(joined);
+            about.coordinates = about.coordinates.or(coordinates);
+        }
+        if queries.rows.source().is_empty() {
+            return Err(Error::Empty("queries").in_file(&self.queries).into());
+        }
+        if self.batch_size == 0 {
+            let (name, value) = ("batch-size", "0".to_owned());
+            return Err(Error::Parameter { name, value, reason: "must be at least 1" }.into());
+        }
+        let distance = match self.distance {
+            Decay::Euclidean => DistanceKind::Euclidean,
+            Decay::Squared => DistanceKind::Squared,
+        };
+        let base = *Sue::corrected().params();
+        let sue = SueParams { k: self.k, lambda: self.lambda, distance, clip_m: self.clip, ..base };
+        Sue::new(sue)?;
+        Ok(Input {
+            references: references.rows,
+            queries: queries.rows,
+            poses,
+            names: references.names,
+            query_names: queries.names,
+            query_poses: queries.poses,
+            about,
+            settings: EstimatorSettings { sue, nth: self.nth },
+            ranks: self.ranks.max(self.k).max(2),
+            batch_size: self.batch_size,
+        })
+    }
+}
+
+impl Input {
+    /// Number of queries.
+    pub(crate) fn n_queries(&self) -> usize {
+        self.queries.source().len()
+    }
+
+    /// Number of references.
+    pub(crate) fn n_references(&self) -> usize {
+        self.references.source().len()
+    }
+
+    /// Retrieves batch by batch and hands on the number of the first query with what was found.
+    pub(crate) fn each_batch(
+        &self,
+        mut then: impl FnMut(usize, &Retrieval) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let metric = self.about.metric.unwrap_or_default();
+        if metric != Metric::Euclidean {
+            let value = vpr_core::map::metric_name(metric).to_owned();
+            let reason = "estimators need Euclidean distances";
+            return Err(Error::Parameter { name: "metric", value, reason }.into());
+        }
+        let params = SearchParams { metric, k: self.ranks, ..SearchParams::default() };
+        let source = self.queries.source();
+        let mut scratch = Vec::new();
+        for start in (0..source.len()).step_by(self.batch_size) {
+            let end = (start + self.batch_size).min(source.len());
+            let block = source.block(start..end, &mut scratch)?.to_vec();
+            let rows = ndarray::Array2::from_shape_vec((end - start, source.dim()), block)?;
+            let batch = Descriptors::new(rows)
+                .with_context(|| format!("queries {start} to {}", end - 1))?;
+            let found = match &self.references {
+                Rows::Open(map) => knn::search(map, &batch, &params)?,
+                Rows::Memory(rows) => knn::search(rows, &batch, &params)?,
+            };
+            then(start, &found)?;
+        }
+        Ok(())
+    }
+
+    /// The retrieval of all queries at once.
+    pub(crate) fn retrieve(&self) -> anyhow::Result<Retrieval> {
+        let (mut indices, mut distances, mut k) = (Vec::new(), Vec::new(), 0);
+        self.each_batch(|_, found| {
+            k = found.k();
+            for query in 0..found.len() {
+                indices.extend(found.indices(query));
+                distances.extend(found.distances(query));
+            }
+            Ok(())
+        })?;
+        let shape = (self.n_queries(), k);
+        let indices = ndarray::Array2::from_shape_vec(shape, indices)?;
+        Ok(Retrieval::new(indices, ndarray::Array2::from_shape_vec(shape, distances)?)?)
+    }
+}
+
+/// The name of an image, or its number.
+pub(crate) fn name_of(names: Option<&Names>, index: usize) -> String {
+    let name = names.and_then(|names| names.get(index));
+    name.map_or_else(|| index.to_string(), str::to_owned)
+}
+
+/// Poses from a file: by name if both have names, by order otherwise.
+pub(crate) fn poses_of(
+    path: &Path,
+    names: Option<&Names>,
+    n: usize,
+) -> anyhow::Result<(Poses, Option<vpr_core::map::Coordinates>)> {
+    let read = door::read(Format::guess(path)?, path)?;
+    let coordinates = read.about.coordinates;
+    let parts = Parts { names: names.cloned(), ..Parts::default() };
+    let joined = parts.join(read).map_err(|err| err.in_file(path))?;
+    let poses = joined.poses.ok_or_else(|| Error::Empty("poses").in_file(path))?;
+    if poses.len() != n {
+        let what = "poses, one per descriptor";
+        let err = Error::Mismatch { what, expected: n, actual: poses.len() };
+        return Err(err.in_file(path).into());
+    }
+    Ok((poses, coordinates))
+}
+
+/// Refuses descriptors of different encoders and coordinates of different grids.
+fn check(map: &About, queries: &About) -> sue::Result<()> {
+    let differ =
+        |a: &Option<String>, b: &Option<String>| matches!((a, b), (Some(a), Some(b)) if a != b);
+    if differ(&map.encoder, &queries.encoder)
+        || differ(&map.weights_digest, &queries.weights_digest)
+    {
+        let name = |about: &About| {
+            let digest = about.weights_digest.as_ref().map(|it| format!(" with weights {it}"));
+            about.encoder.clone().unwrap_or_default() + &digest.unwrap_or_default()
+        };
+        return Err(sue::Error::OtherEncoder { map: name(map), queries: name(queries) });
+    }
+    match (&map.coordinates, &queries.coordinates) {
+        (Some(a), Some(b)) if a != b => {
+            Err(sue::Error::OtherCoordinates { first: a.to_string(), second: b.to_string() })
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,7 @@
+//! One file per subcommand.
+
+pub(crate) mod calibrate;
+pub(crate) mod estimate;
+pub(crate) mod evaluate;
+mod input;
+mod truth;

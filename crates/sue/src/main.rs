@@ -1,0 +1,34 @@
+//! `sue`: how far to trust a match, on the command line.
+
+mod command;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use vpr_core::cli;
+
+/// SUE, chapter 5: uncertainty of the best match in visual place recognition.
+#[derive(Parser)]
+#[command(version, about, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Say how uncertain the best match of every query is
+    Estimate(Box<command::estimate::EstimateArgs>),
+    /// Say how well estimators tell correct from wrong matches
+    Evaluate(Box<command::evaluate::EvaluateArgs>),
+    /// Choose a threshold that keeps a promise, from queries whose correct references are known
+    Calibrate(Box<command::calibrate::CalibrateArgs>),
+}
+
+fn main() -> ExitCode {
+    cli::main(|| match Cli::parse().command {
+        Command::Estimate(args) => command::estimate::run(&args),
+        Command::Evaluate(args) => command::evaluate::run(&args),
+        Command::Calibrate(args) => command::calibrate::run(&args),
+    })
+}
