@@ -71,11 +71,8 @@ fn last(
         .zip(variance.values())
         .map(|(gamma, variance)| gamma / (variance + epsilon).sqrt())
         .collect();
-    let shift = beta.values().iter().zip(mean.values()).zip(&scale).enumerate();
-    let shift = shift.map(|(channel, ((beta, mean), scale))| {
-        let bias = bias.as_ref().map_or(0.0, |it| it[channel]);
-        beta + (bias - mean) * scale
-    });
+    let shift = beta.values().iter().zip(mean.values()).zip(bias.iter().zip(&scale));
+    let shift = shift.map(|((beta, mean), (bias, scale))| beta + (bias - mean) * scale);
     let shift = Some(shift.collect());
     Some(Last { scale: Some(scale), shift, residual, activation })
 }

@@ -2,6 +2,7 @@
 
 mod conv2d;
 mod conv_norm;
+mod gradient;
 mod kernel;
 mod plain;
 

@@ -62,6 +62,36 @@ impl<'a> Planes<'a> {
         }
     }
 
+    /// What 16 weights from `first` on are multiplied with at some output pixels: a row per pixel.
+    pub(super) fn lower_weights(
+        &self,
+        first: usize,
+        pixels: std::ops::Range<usize>,
+        panel: &mut [Lanes],
+    ) {
+        let n_elements = self.starts.len();
+        let n_weights = self.values.len() / self.per_channel * n_elements;
+        let width = self.output[1];
+        for lane in 0..TILE {
+            let weight = first + lane;
+            if weight >= n_weights {
+                panel.iter_mut().for_each(|row| row[lane] = 0.0);
+                continue;
+            }
+            let start = weight / n_elements * self.per_channel + self.starts[weight % n_elements];
+            let mut pixel = pixels.start;
+            while pixel < pixels.end {
+                let (row, column) = (pixel / width, pixel % width);
+                let n = (width - column).min(pixels.end - pixel);
+                let source = &self.values[start + row * self.size[1] + column..][..n];
+                for (to, &from) in panel[pixel - pixels.start..].iter_mut().zip(source) {
+                    to[lane] = from;
+                }
+                pixel += n;
+            }
+        }
+    }
+
     /// Runs of a panel's pixels: where in a plane, where in the panel, how many.
     fn runs(&self, first: usize) -> Vec<(usize, usize, usize)> {
         let [height, width] = self.output;
@@ -106,7 +136,9 @@ fn phases(image: &[f32], geometry: &Geometry, size: [usize; 2], per_channel: usi
                 row[first..first + n].copy_from_slice(&source[start..start + n]);
             } else {
                 let source = source.iter().skip(start).step_by(stride[1]);
-                inside.zip(source).for_each(|(to, &from)| *to = from);
+                for (to, &from) in inside.zip(source) {
+                    *to = from;
+                }
             }
         }
     }

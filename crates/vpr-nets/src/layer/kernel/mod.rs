@@ -7,6 +7,7 @@ mod finish;
 mod geometry;
 mod lower;
 mod multiply;
+mod weights_gradient;
 mod winograd;
 
 use std::sync::OnceLock;
@@ -15,6 +16,7 @@ pub use finish::Activation;
 pub(crate) use finish::Finish;
 pub(crate) use geometry::Geometry;
 use multiply::Packed;
+pub(crate) use weights_gradient::weights_gradient;
 use winograd::Frequencies;
 
 /// Weights of one group of a convolution, packed when first needed.

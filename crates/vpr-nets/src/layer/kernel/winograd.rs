@@ -328,12 +328,12 @@ impl Part<'_> {
         let last = ((panel + 1) * TILE).min(self.tiles.len());
         for channel in group * TILE..((group + 1) * TILE).min(n_out) {
             let row = channel % TILE;
-            let half: [[Lanes; STEP]; REACH] = std::array::from_fn(|y| {
-                output_line(std::array::from_fn(|x| sums[y * REACH + x][row]))
+            let half: [[Lanes; STEP]; REACH] = std::array::from_fn(|x| {
+                output_line(std::array::from_fn(|y| sums[y * REACH + x][row]))
             });
             let whole: [[Lanes; STEP]; STEP] =
-                std::array::from_fn(|x| output_line(std::array::from_fn(|y| half[y][x])));
-            let whole = whole.map(|column| column.map(|it| self.scaled(channel, it)));
+                std::array::from_fn(|y| output_line(std::array::from_fn(|x| half[x][y])));
+            let whole = whole.map(|line| line.map(|it| self.scaled(channel, it)));
             for (lane, tile) in (panel * TILE..last).enumerate() {
                 let (image, [top, left]) = self.tiles.place(tile);
                 let at = (image * n_out + channel) * self.tiles.output[0] * self.tiles.output[1];
@@ -354,7 +354,7 @@ impl Part<'_> {
     }
 }
 
-/// Stores one lane's 4×4 outputs, `[column][row]`, as far as they lie inside.
+/// Stores one lane's 4×4 outputs as far as they lie inside.
 #[inline(always)]
 fn scatter(
     whole: &[[Lanes; STEP]; STEP],
@@ -366,9 +366,9 @@ fn scatter(
     finish: &Finish<'_>,
 ) {
     let n = STEP.min(width - left);
-    for row in 0..STEP.min(height - top) {
+    for (row, line) in whole.iter().enumerate().take(height - top) {
         let start = (top + row) * width + left;
-        let mut values: [f32; STEP] = std::array::from_fn(|column| whole[column][row][lane]);
+        let mut values = line.map(|lanes| lanes[lane]);
         if let Some(residual) = finish.residual {
             for (value, residual) in values.iter_mut().zip(&residual[at + start..][..n]) {
                 *value += residual;
