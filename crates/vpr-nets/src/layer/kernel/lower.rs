@@ -75,7 +75,9 @@ impl<'a> Planes<'a> {
         for lane in 0..TILE {
             let weight = first + lane;
             if weight >= n_weights {
-                panel.iter_mut().for_each(|row| row[lane] = 0.0);
+                for row in panel.iter_mut() {
+                    row[lane] = 0.0;
+                }
                 continue;
             }
             let start = weight / n_elements * self.per_channel + self.starts[weight % n_elements];
