@@ -59,7 +59,7 @@ pub(crate) fn run(args: &EncodeArgs) -> anyhow::Result<Outcome> {
     bar.finish_and_clear();
     for (name, reason) in &written.skipped {
         let reason =
-            reason.as_ref().map_or("skipped by an earlier run".to_owned(), |err| err.to_string());
+            reason.as_ref().map_or("skipped by an earlier run".to_owned(), ToString::to_string);
         cli::note(&format!("skipped `{name}`: {reason}"));
     }
     let earlier = match written.n_resumed {

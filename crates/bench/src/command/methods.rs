@@ -69,5 +69,6 @@ fn everything(method: &Method, roots: &[PathBuf]) -> String {
         ("at hand", place),
         ("checked", method.checked.clone()),
     ];
-    rows.iter().map(|(key, value)| format!("{key:<12}{value}\n")).collect()
+    let lines: Vec<_> = rows.iter().map(|(key, value)| format!("{key:<12}{value}\n")).collect();
+    lines.concat()
 }
