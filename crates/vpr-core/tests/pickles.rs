@@ -181,6 +181,7 @@ fn size(value: &Value) -> usize {
         Value::Text(text) => text.len(),
         Value::List(values) | Value::Tuple(values) => values.iter().map(size).sum(),
         Value::Dict(pairs) => pairs.iter().map(|(key, value)| size(key) + size(value)).sum(),
+        Value::Tensor(tensor) => tensor.storage.len() + 2 * tensor.shape.len(),
         Value::Array { shape, elements } => {
             shape.len()
                 + match elements {
