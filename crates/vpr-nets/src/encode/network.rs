@@ -9,6 +9,7 @@ use burn::{
 
 use super::{
     Encoder, Preprocessing, Size,
+    netvlad_mobile::NetVladMobile,
     registry::{Architecture, Method},
 };
 use crate::{
@@ -108,6 +109,11 @@ pub fn by_request(request: &Request) -> Result<Box<dyn Encoder>> {
         Architecture::Default => {
             let network = DefaultEncoderConfig::new().init(&device);
             assembled(network, weights, &[], DefaultEncoder::forward)?
+        }
+        Architecture::NetVladMobileNetV2 => {
+            let network = NetVladMobile::new(method.preprocessing().n_channels(), &device);
+            let weights = NetVladMobile::keys(weights)?;
+            assembled(network, weights, &[], NetVladMobile::forward)?
         }
         Architecture::EfficientNetLite0 => efficientnet_lite0(weights, &device)?,
         _ => return Err(crate::Error::format(path, "architecture", "is not built yet")),
