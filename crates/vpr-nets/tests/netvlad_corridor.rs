@@ -1,6 +1,6 @@
 //! The shipped NetVLAD on the real Corridor images, against the numbers it is known to give.
 
-#![expect(clippy::unwrap_used, reason = "a test may")]
+#![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
 use std::path::{Path, PathBuf};
 
