@@ -5,6 +5,14 @@ use std::{fs, path::Path};
 use ndarray::Array2;
 use vpr_core::{
     Descriptors, Error, PlanarPosition, Pose, Poses,
+    dataset::{
+        layout::{
+            pose_csv::PoseTable,
+            vpr_bench::{GroundTruthFile, PublishedMatches, read_areas, read_curves},
+        },
+        manifest::Manifest,
+    },
+    knn::{Pca, PcaParams},
     map::{
         About, Coordinates, GrowingMap, RowType, UtmZone,
         door::{self, Format, PairList, Pairs, Parts},
@@ -32,6 +40,18 @@ macro_rules! file_target {
             name: $name,
             file: $file,
             read: |folder| door::problems($format, &folder.join($file)),
+            notices_all: false,
+        }
+    };
+}
+
+/// A target that reads the file `file` by one function.
+macro_rules! read_target {
+    ($name:literal, $file:literal, $read:expr) => {
+        Target {
+            name: $name,
+            file: $file,
+            read: |folder| ($read)(&folder.join($file)).err().into_iter().collect(),
             notices_all: false,
         }
     };
@@ -88,6 +108,16 @@ pub(crate) const TARGETS: &[Target] = &[
         read: |folder| door::read_pairs(Format::VprEval, folder).err().into_iter().collect(),
         notices_all: false,
     },
+    file_target!("npy", "a.npy", Format::Npy),
+    read_target!("pca", "a.json", Pca::open),
+    read_target!("dataset-manifest", "a.toml", Manifest::read),
+    read_target!("pose-table", "a.csv", PoseTable::read),
+    read_target!("vpr-bench-matches", "a.npy", PublishedMatches::read),
+    read_target!("vpr-bench-truth", "a.npy", |path: &Path| {
+        GroundTruthFile::read(path)?.truth(10)
+    }),
+    read_target!("vpr-bench-curves", "a.pickle", read_curves),
+    read_target!("vpr-bench-areas", "a.pickle", read_areas),
     Target {
         name: "npy-objects",
         file: "a.npy",
@@ -146,6 +176,14 @@ pub(crate) fn write_seeds(corpus: &Path) {
         seed(target, &name, &path);
     }
     let place = |name: &str| folder.path().join(name);
+    npy::write_f32(&place("npy"), six_dof.descriptors.as_ref().unwrap().view()).unwrap();
+    seed("npy", "sound", &place("npy"));
+    let params = PcaParams { n_components: 2, whiten: true };
+    let many = Array2::from_shape_fn((9, 3), |(row, column)| ((row * 7 + column * 3) % 5) as f32);
+    Pca::fit(&Descriptors::new(many).unwrap(), &params).unwrap().save(&place("pca")).unwrap();
+    seed("pca", "sound", &place("pca"));
+    door::write(Format::PoseCsv, &place("poses"), &six_dof).unwrap();
+    seed("pose-table", "sound", &place("poses"));
     door::write(Format::SevenScenes, &place("scene"), &parts(1)).unwrap();
     seed("7scenes", "sound", &place("scene/frame-000000.pose.txt"));
     door::write(Format::Kapture, &place("kapture"), &six_dof).unwrap();
