@@ -52,12 +52,12 @@ fn every_metric_and_code_finds_nearly_all_neighbours_at_their_exact_distances() 
             let found = hnsw.search(&references, &queries, 10).unwrap();
             for query in 0..queries.len() {
                 let values = &queries.as_slice()[query * DIM..][..DIM];
-                let mut last = f32::NEG_INFINITY;
+                let mut nearer = f32::NEG_INFINITY;
                 for (&index, &distance) in found.indices(query).iter().zip(found.distances(query)) {
                     let row = &references.as_slice()[index * DIM..][..DIM];
                     assert_eq!(distance, metric.distance(values, row));
-                    assert!(distance >= last);
-                    last = distance;
+                    assert!(distance >= nearer);
+                    nearer = distance;
                 }
             }
         }
@@ -131,9 +131,9 @@ fn damage_is_found_before_usearch_sees_it() {
         let at = rng.random_range(0..sound.len());
         let mut bytes = sound.clone();
         if round % 2 == 0 {
-            bytes.truncate(at)
+            bytes.truncate(at);
         } else {
-            bytes[at] ^= 1 << rng.random_range(0..8)
+            bytes[at] ^= 1 << rng.random_range(0..8);
         }
         fs::write(&path, &bytes).unwrap();
         assert!(matches!(Hnsw::open(&path), Err(Error::Format { .. })));

@@ -1,6 +1,9 @@
 //! The parsers, how each is called, and the sound files that damage starts from.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use ndarray::Array2;
 use vpr_core::{
@@ -147,6 +150,15 @@ fn parts(n: usize) -> Parts {
     }
 }
 
+/// A small projection, saved in this folder.
+fn pca(folder: &Path) -> PathBuf {
+    let params = PcaParams { n_components: 2, whiten: true };
+    let rows = Array2::from_shape_fn((9, 3), |(row, column)| ((row * 7 + column * 3) % 5) as f32);
+    let path = folder.join("pca");
+    Pca::fit(&Descriptors::new(rows).unwrap(), &params).unwrap().save(&path).unwrap();
+    path
+}
+
 /// Writes one sound file of every format, and keeps what is there already.
 pub(crate) fn write_seeds(corpus: &Path) {
     let folder = tempfile::tempdir().unwrap();
@@ -164,6 +176,8 @@ pub(crate) fn write_seeds(corpus: &Path) {
         ("tum", Format::Tum, None),
         ("kitti", Format::Kitti, None),
         ("csv", Format::PoseCsv, None),
+        ("pose-table", Format::PoseCsv, None),
+        ("npy", Format::Npy, None),
         ("map", Format::Map, Some(RowType::I8)),
         ("map", Format::Map, Some(RowType::F16)),
     ] {
@@ -175,15 +189,8 @@ pub(crate) fn write_seeds(corpus: &Path) {
         }
         seed(target, &name, &path);
     }
+    seed("pca", "sound", &pca(folder.path()));
     let place = |name: &str| folder.path().join(name);
-    npy::write_f32(&place("npy"), six_dof.descriptors.as_ref().unwrap().view()).unwrap();
-    seed("npy", "sound", &place("npy"));
-    let params = PcaParams { n_components: 2, whiten: true };
-    let many = Array2::from_shape_fn((9, 3), |(row, column)| ((row * 7 + column * 3) % 5) as f32);
-    Pca::fit(&Descriptors::new(many).unwrap(), &params).unwrap().save(&place("pca")).unwrap();
-    seed("pca", "sound", &place("pca"));
-    door::write(Format::PoseCsv, &place("poses"), &six_dof).unwrap();
-    seed("pose-table", "sound", &place("poses"));
     door::write(Format::SevenScenes, &place("scene"), &parts(1)).unwrap();
     seed("7scenes", "sound", &place("scene/frame-000000.pose.txt"));
     door::write(Format::Kapture, &place("kapture"), &six_dof).unwrap();

@@ -76,7 +76,7 @@ impl Coder {
     }
 }
 
-/// USearch's name for what is compared; of normalized vectors the squared distance.
+/// `USearch`'s name for what is compared; of normalized vectors the squared distance.
 pub(super) fn metric_kind(metric: Metric) -> Result<MetricKind> {
     match metric {
         Metric::Euclidean | Metric::Cosine => Ok(MetricKind::L2sq),
@@ -89,7 +89,7 @@ pub(super) fn metric_kind(metric: Metric) -> Result<MetricKind> {
     }
 }
 
-/// USearch's name for the codes.
+/// `USearch`'s name for the codes.
 pub(super) fn scalar_kind(codes: HnswCodes) -> ScalarKind {
     match codes {
         HnswCodes::F32 => ScalarKind::F32,

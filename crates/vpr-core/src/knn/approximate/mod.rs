@@ -1,4 +1,4 @@
-//! Approximate search by USearch's HNSW graph, ranked exactly afterwards.
+//! Approximate search by `USearch`'s HNSW graph, ranked exactly afterwards.
 //!
 //! The graph chooses candidates, so the distances and the order of what is returned are exact, but
 //! a neighbour can be missing; how many are is measured and kept beside the index.
@@ -98,8 +98,8 @@ impl Hnsw {
     ///
     /// # Errors
     ///
-    /// [`Error::Parameter`] for the Manhattan metric, which USearch does not have, and for what
-    /// USearch refuses; [`Error::Empty`] without references; those of [`RowSource::block`].
+    /// [`Error::Parameter`] for the Manhattan metric, which `USearch` does not have, and for what
+    /// `USearch` refuses; [`Error::Empty`] without references; those of [`RowSource::block`].
     pub fn build(
         rows: &(impl RowSource + ?Sized),
         metric: Metric,
@@ -242,7 +242,7 @@ impl Hnsw {
         replace(&description_of(path), &sidecar.to_json())
     }
 
-    /// Maps what [`Self::save`] wrote; the file is read once to check its digest, because USearch
+    /// Maps what [`Self::save`] wrote; the file is read once to check its digest, because `USearch`
     /// trusts what it maps.
     ///
     /// # Errors
@@ -307,7 +307,7 @@ fn refused(err: impl ToString) -> Error {
     Error::Parameter { name: "hnsw", value: err.to_string(), reason: "refused by USearch" }
 }
 
-/// USearch has working memory for so many searches at a time, and does not look how many there are.
+/// `USearch` has working memory for so many searches at a time, and does not look how many there are.
 struct Permits {
     total: usize,
     free: Mutex<usize>,
