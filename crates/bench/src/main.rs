@@ -21,10 +21,14 @@ enum Command {
     Run(command::run::RunArgs),
     /// Say how many queries find a correct reference, from two folders or two descriptor files
     Evaluate(Box<command::evaluate::EvaluateArgs>),
+    /// Describe the images of a folder with a network, and write their map
+    Encode(Box<command::encode::EncodeArgs>),
     /// List what there is
     List(command::list::ListArgs),
     /// Make, convert, check and search reference maps on disk
     Map(command::map::MapArgs),
+    /// Say which networks there are and where their weights are from
+    Methods(command::methods::MethodsArgs),
     /// Say everything that is wrong with a dataset folder
     Validate(command::validate::ValidateArgs),
 }
@@ -33,8 +37,10 @@ fn main() -> ExitCode {
     cli::main(|| match Cli::parse().command {
         Command::Run(args) => command::run::run(&args),
         Command::Evaluate(args) => command::evaluate::run(&args),
+        Command::Encode(args) => command::encode::run(&args),
         Command::List(args) => command::list::run(&args),
         Command::Map(args) => command::map::run(&args),
+        Command::Methods(args) => command::methods::run(&args),
         Command::Validate(args) => command::validate::run(&args),
     })
 }

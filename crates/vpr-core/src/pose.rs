@@ -59,6 +59,20 @@ impl Poses {
         Ok(())
     }
 
+    /// The poses of these images, in this order.
+    ///
+    /// # Panics
+    ///
+    /// If there is no such image.
+    #[must_use]
+    pub fn select(&self, images: &[usize]) -> Self {
+        match self {
+            Self::Planar(all) => Self::Planar(images.iter().map(|&image| all[image]).collect()),
+            Self::Spatial(all) => Self::Spatial(images.iter().map(|&image| all[image]).collect()),
+            Self::SixDof(all) => Self::SixDof(images.iter().map(|&image| all[image]).collect()),
+        }
+    }
+
     /// How the kind is called in messages.
     #[must_use]
     pub fn kind(&self) -> &'static str {

@@ -1,14 +1,28 @@
 //! Networks of visual place recognition, on burn.
+//!
+//! ```no_run
+//! use vpr_nets::encode::{Options, by_name, encode_files};
+//!
+//! // Weights are in `data/weights/`; `bench methods` says where they are from.
+//! let encoder = by_name("netvlad-mobilenetv2-rgb", None, &["data".into()])?;
+//! let images = ["a.jpg".into(), "b.jpg".into()];
+//! let descriptors = encode_files(&*encoder, &images, &Options::default(), &mut |_| ())?;
+//! assert_eq!(descriptors.dim(), encoder.dimension());
+//! # Ok::<(), vpr_nets::Error>(())
+//! ```
 
 pub mod aggregate;
 pub mod backbone;
 pub mod encode;
+mod error;
 pub mod layer;
 pub mod local;
 pub mod loss;
 pub mod model;
 pub mod train;
 pub mod weights;
+
+pub use error::{Error, Mismatch, Result};
 
 /// The device that networks run on: the default CPU backend.
 #[must_use]

@@ -115,7 +115,13 @@ pub fn gray(image: &RgbImage) -> GrayImage {
     from_pixels(image.size(), pixels.iter().copied().map(luma).collect())
 }
 
-fn from_pixels<const C: usize>(size: ImageSize, pixels: Vec<u8>) -> Image<u8, C> {
+/// An image of these pixels.
+///
+/// # Panics
+///
+/// If there are not height × width × `C` of them.
+#[must_use]
+pub fn from_pixels<const C: usize>(size: ImageSize, pixels: Vec<u8>) -> Image<u8, C> {
     Image::new(size, pixels).expect("height × width × channels bytes")
 }
 

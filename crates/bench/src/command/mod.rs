@@ -1,8 +1,11 @@
 //! The subcommands: each parses, calls the library and prints.
 
+pub(crate) mod encode;
+mod encoder;
 pub(crate) mod evaluate;
 pub(crate) mod list;
 pub(crate) mod map;
+pub(crate) mod methods;
 pub(crate) mod predictions;
 pub(crate) mod run;
 pub(crate) mod validate;

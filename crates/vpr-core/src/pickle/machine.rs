@@ -6,25 +6,33 @@ use super::{
     Refusal,
     cursor::Cursor,
     numpy,
-    object::{Arena, Node, Object},
+    object::{Arena, Global, Node, Object},
     text,
+    torch::{self, Name},
 };
 
 /// Runs a pickle up to its STOP; returns its root and the objects made on the way.
 pub(super) fn run(bytes: &[u8]) -> Result<(Node<'_>, Arena<'_>), Refusal> {
-    let mut machine = Machine {
-        cursor: Cursor::new(bytes),
-        arena: Arena::new(bytes.len()),
-        stack: Vec::new(),
-        marks: Vec::new(),
-        memo: HashMap::new(),
-    };
-    loop {
-        match machine.cursor.opcode()? {
-            b'.' => return machine.stop(),
-            code => machine.step(code)?,
-        }
+    let (root, machine) = Machine::new(bytes, Dialect::NumPy).run()?;
+    match machine.cursor.left() {
+        0 => Ok((root, machine.arena)),
+        left => machine.refuse(format!("STOP: {left} bytes follow")),
     }
+}
+
+/// Runs the pickle of a PyTorch checkpoint that `bytes` begin with; returns its length as well.
+pub(super) fn run_checkpoint(bytes: &[u8]) -> Result<(Node<'_>, Arena<'_>, usize), Refusal> {
+    let (root, machine) = Machine::new(bytes, Dialect::Torch).run()?;
+    let len = bytes.len() - machine.cursor.left();
+    Ok((root, machine.arena, len))
+}
+
+/// Whose names may be called.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Dialect {
+    NumPy,
+    /// NumPy's and PyTorch's.
+    Torch,
 }
 
 struct Machine<'a> {
@@ -34,9 +42,31 @@ struct Machine<'a> {
     /// Stack heights at which MARK was seen.
     marks: Vec<usize>,
     memo: HashMap<u64, Node<'a>>,
+    dialect: Dialect,
 }
 
 impl<'a> Machine<'a> {
+    fn new(bytes: &'a [u8], dialect: Dialect) -> Self {
+        Self {
+            cursor: Cursor::new(bytes),
+            arena: Arena::new(bytes.len()),
+            stack: Vec::new(),
+            marks: Vec::new(),
+            memo: HashMap::new(),
+            dialect,
+        }
+    }
+
+    /// Runs to STOP.
+    fn run(mut self) -> Result<(Node<'a>, Self), Refusal> {
+        loop {
+            match self.cursor.opcode()? {
+                b'.' => return self.stop(),
+                code => self.step(code)?,
+            }
+        }
+    }
+
     fn step(&mut self, code: u8) -> Result<(), Refusal> {
         match code {
             0x80 => self.protocol(),
@@ -57,26 +87,20 @@ impl<'a> Machine<'a> {
             b'g' | b'h' | b'j' => self.get(code),
             b'c' | 0x93 => self.global(code),
             b'R' => self.reduce(),
-            b'b' => {
-                let state = self.pop()?;
-                let target = self.top()?;
-                numpy::build(&mut self.arena, target, state).or_else(|reason| self.refuse(reason))
-            }
+            b'b' => self.build(),
+            b'Q' | 0x81 if self.dialect == Dialect::Torch => self.torch(code),
             _ => {
                 self.cursor.refuse(format!("opcode 0x{code:02x}{} is not read", opcode_name(code)))
             }
         }
     }
 
-    fn stop(mut self) -> Result<(Node<'a>, Arena<'a>), Refusal> {
+    fn stop(mut self) -> Result<(Node<'a>, Self), Refusal> {
         let root = self.pop()?;
         if !self.stack.is_empty() || !self.marks.is_empty() {
             return self.refuse("STOP: more than one object is left");
         }
-        match self.cursor.left() {
-            0 => Ok((root, self.arena)),
-            left => self.refuse(format!("STOP: {left} bytes follow")),
-        }
+        Ok((root, self))
     }
 
     fn protocol(&mut self) -> Result<(), Refusal> {
@@ -204,6 +228,7 @@ impl<'a> Machine<'a> {
         match self.arena.get_mut(id) {
             Object::List(list) if to_list => list.extend(items),
             Object::Dict(dict) if !to_list => dict.extend(items),
+            Object::Inert => {}
             _ => return self.refuse("adds to an object of another kind"),
         }
         Ok(())
@@ -236,12 +261,12 @@ impl<'a> Machine<'a> {
     fn global(&mut self, code: u8) -> Result<(), Refusal> {
         let found = if code == b'c' {
             let names = (self.cursor.ascii_line()?, self.cursor.ascii_line()?);
-            numpy::global(names.0, names.1).ok_or_else(|| shown(names.0, names.1))
+            self.lookup(names.0, names.1).ok_or_else(|| shown(names.0, names.1))
         } else {
             let (name, module) = (self.pop()?, self.pop()?);
             match (self.arena.text(module), self.arena.text(name)) {
                 (Some(module), Some(name)) => {
-                    numpy::global(module, name).ok_or_else(|| shown(module, name))
+                    self.lookup(module, name).ok_or_else(|| shown(module, name))
                 }
                 _ => return self.refuse("STACK_GLOBAL: a name is not a string"),
             }
@@ -254,13 +279,50 @@ impl<'a> Machine<'a> {
         }
     }
 
+    fn lookup(&self, module: &str, name: &str) -> Option<Global> {
+        let torch = || torch::global(module, name).filter(|_| self.dialect == Dialect::Torch);
+        numpy::global(module, name).or_else(|| torch().map(Global::Torch))
+    }
+
+    /// Sets the state of an object; of a dictionary or of settings it is not kept.
+    fn build(&mut self) -> Result<(), Refusal> {
+        let state = self.pop()?;
+        let target = self.top()?;
+        if let Node::Object(id) = target
+            && self.dialect == Dialect::Torch
+            && matches!(self.arena.get(id), Object::Dict(_) | Object::Inert)
+        {
+            return Ok(());
+        }
+        numpy::build(&mut self.arena, target, state).or_else(|reason| self.refuse(reason))
+    }
+
+    /// BINPERSID, a storage, and NEWOBJ, settings.
+    fn torch(&mut self, code: u8) -> Result<(), Refusal> {
+        let argument = self.pop()?;
+        if code == b'Q' {
+            return match torch::persistent(&self.arena, argument) {
+                Ok(object) => self.make(object),
+                Err(reason) => self.refuse(format!("BINPERSID: {reason}")),
+            };
+        }
+        match self.pop()? {
+            Node::Global(Global::Torch(Name::Inert)) => self.make(Object::Inert),
+            _ => self.refuse("NEWOBJ: makes what is not on the list"),
+        }
+    }
+
     fn reduce(&mut self) -> Result<(), Refusal> {
         let (arguments, function) = (self.pop()?, self.pop()?);
         let Node::Global(function) = function else {
             return self.refuse("REDUCE: calls what is not a function");
         };
         let at = self.cursor.opcode_at();
-        match numpy::reduce(&mut self.arena, function, arguments, at) {
+        let made = match function {
+            Global::Torch(name) => torch::reduce(&mut self.arena, name, arguments, at),
+            function => numpy::reduce(&mut self.arena, function, arguments, at),
+        };
+        match made {
             Ok(node) => self.push(node),
             Err(reason) => self.refuse(format!("REDUCE: {reason}")),
         }

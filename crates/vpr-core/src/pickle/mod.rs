@@ -9,6 +9,8 @@
 //! [`MAX_EXPANSION`] times as many bytes and objects as the pickle has bytes, nested at most
 //! [`MAX_DEPTH`] levels deep.
 //!
+//! PyTorch's checkpoints have a dialect of their own, [`decode_checkpoint`].
+//!
 //! ```
 //! use vpr_core::pickle::{Value, decode};
 //!
@@ -24,11 +26,13 @@ mod machine;
 mod numpy;
 mod object;
 mod text;
+mod torch;
 mod unfold;
 mod value;
 
 use std::path::Path;
 
+pub use torch::{Element, Tensor, decode_checkpoint};
 pub use unfold::{MAX_DEPTH, MAX_EXPANSION};
 pub use value::{Elements, Value};
 

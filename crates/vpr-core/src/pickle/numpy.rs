@@ -58,6 +58,7 @@ pub(super) fn reduce<'a>(
             return encode(arena, text, at);
         }
         (Global::Bytes, []) => Object::Bytes(Vec::new()),
+        (Global::Torch(name), _) => return Err(format!("{name:?} is not of NumPy")),
         (Global::Ndarray, _) => return Err("numpy.ndarray is not called".into()),
         _ => return Err(wrong()),
     };

@@ -1,6 +1,6 @@
 //! What the machine works on: small nodes on the stack, and an arena of the objects they refer to.
 
-use super::{Refusal, numpy::Dtype};
+use super::{Refusal, numpy::Dtype, torch};
 
 /// One stack or memo entry; strings are borrowed from the pickle.
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +33,8 @@ pub(super) enum Global {
     Encode,
     /// `bytes`, only called without arguments.
     Bytes,
+    /// What only checkpoints of PyTorch name.
+    Torch(torch::Name),
 }
 
 /// Something with identity: later opcodes may still add to it.
@@ -46,6 +48,15 @@ pub(super) enum Object<'a> {
     Text(String),
     Dtype(Dtype),
     Array(Option<Array<'a>>),
+    /// What a tensor is a view of.
+    Storage {
+        key: String,
+        element: torch::Element,
+        len: usize,
+    },
+    Tensor(torch::Tensor),
+    /// Settings beside weights; what they hold is not kept.
+    Inert,
 }
 
 /// The state of an array, checked except for the number of elements.

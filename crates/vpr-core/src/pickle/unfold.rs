@@ -3,7 +3,8 @@
 use super::{
     Elements, Refusal, Value,
     numpy::Dtype,
-    object::{Arena, Array, Node, Object},
+    object::{Arena, Array, Global, Node, Object},
+    torch::Name,
 };
 use crate::npy::dtype::{Kind, n_elements};
 
@@ -31,7 +32,9 @@ impl<'a> Unfolder<'_, 'a> {
     /// One value; `parent` is the object it is part of, for messages.
     fn value(&mut self, node: Node<'a>, parent: usize, depth: usize) -> Result<Value, Refusal> {
         Ok(match node {
-            Node::None => self.spend(1, parent, Value::None)?,
+            Node::None | Node::Global(Global::Torch(Name::Inert)) => {
+                self.spend(1, parent, Value::None)?
+            }
             Node::Bool(value) => self.spend(1, parent, Value::Bool(value))?,
             Node::Int(value) => self.spend(1, parent, Value::Int(value))?,
             Node::Float(value) => self.spend(1, parent, Value::Float(value))?,
@@ -76,6 +79,12 @@ impl<'a> Unfolder<'_, 'a> {
             Object::Dtype(_) => return arena.refuse(id, "a dtype is not data"),
             Object::Array(None) => return arena.refuse(id, "the array has no state"),
             Object::Array(Some(array)) => self.array(array, id, depth)?,
+            Object::Storage { .. } => return arena.refuse(id, "a storage is not data"),
+            Object::Tensor(tensor) => {
+                self.spend(tensor.storage.len() + 2 * tensor.shape.len(), id, ())?;
+                Value::Tensor(tensor.clone())
+            }
+            Object::Inert => Value::None,
         })
     }
 

@@ -28,6 +28,9 @@ pub enum Value {
         /// The elements in C order, as many as the product of `shape`.
         elements: Elements,
     },
+    /// A tensor of a PyTorch checkpoint; only [`decode_checkpoint`](super::decode_checkpoint)
+    /// makes these.
+    Tensor(super::Tensor),
 }
 
 /// The elements of a NumPy array, in C order.
@@ -60,6 +63,7 @@ impl Value {
             Self::Tuple(_) => "a tuple",
             Self::Dict(_) => "a dict",
             Self::Array { .. } => "an array",
+            Self::Tensor(_) => "a tensor",
         }
     }
 

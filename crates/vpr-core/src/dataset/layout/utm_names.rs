@@ -34,7 +34,7 @@ impl UtmFolder {
     /// UTM zones, whose coordinates cannot be compared.
     pub fn open(folder: &Path) -> Result<Self> {
         let list = list_path(folder);
-        let images = if list.is_file() { listed(folder, &list)? } else { found(folder)? };
+        let images = if list.is_file() { listed(folder, &list)? } else { images_below(folder)? };
         if images.is_empty() {
             return Err(Error::format(folder, "folder", "has no image"));
         }
@@ -107,7 +107,11 @@ fn listed(folder: &Path, list: &Path) -> Result<Vec<PathBuf>> {
 }
 
 /// All images below a folder, sorted by path. Links to directories are not followed.
-fn found(folder: &Path) -> Result<Vec<PathBuf>> {
+///
+/// # Errors
+///
+/// [`Error::Io`] if a folder cannot be read.
+pub fn images_below(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images = Vec::new();
     let mut folders = vec![folder.to_owned()];
     while let Some(folder) = folders.pop() {

@@ -96,7 +96,7 @@ impl Parts {
             })
         });
         let rows: Vec<usize> = rows.collect::<Result<_>>()?;
-        self.poses = Some(select(poses, &rows));
+        self.poses = Some(poses.select(&rows));
         Ok(self)
     }
 
@@ -139,13 +139,5 @@ impl Parts {
     pub(super) fn name(&self, row: usize) -> String {
         let name = self.names.as_ref().and_then(|names| names.get(row));
         name.map_or_else(|| format!("{row:06}"), str::to_owned)
-    }
-}
-
-fn select(poses: &Poses, rows: &[usize]) -> Poses {
-    match poses {
-        Poses::Planar(all) => Poses::Planar(rows.iter().map(|&row| all[row]).collect()),
-        Poses::Spatial(all) => Poses::Spatial(rows.iter().map(|&row| all[row]).collect()),
-        Poses::SixDof(all) => Poses::SixDof(rows.iter().map(|&row| all[row]).collect()),
     }
 }

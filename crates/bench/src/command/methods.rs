@@ -1,0 +1,73 @@
+//! `bench methods`: which networks there are, what they need, and where their weights are from.
+
+use std::path::PathBuf;
+
+use vpr_core::cli::{self, DataArgs, Outcome};
+use vpr_nets::encode::{
+    Interpolation, Size,
+    registry::{Method, methods},
+};
+
+/// Say which networks there are, or everything about one.
+#[derive(clap::Args)]
+pub(crate) struct MethodsArgs {
+    /// The one to tell everything about
+    name: Option<String>,
+    #[command(flatten)]
+    data: DataArgs,
+}
+
+pub(crate) fn run(args: &MethodsArgs) -> anyhow::Result<Outcome> {
+    let roots = [args.data.data.clone(), PathBuf::from("data")];
+    let text = match &args.name {
+        Some(name) => everything(&Method::find(name, None)?, &roots),
+        None => methods().iter().map(|method| line(method, &roots)).collect(),
+    };
+    cli::print(&text)?;
+    Ok(Outcome::Success)
+}
+
+fn line(method: &Method, roots: &[PathBuf]) -> String {
+    let dimension = method.dimensions[0];
+    let at_hand = method.dimensions.iter().any(|&it| method.locate(it, roots).is_some());
+    let state = if at_hand { "at hand" } else { "absent" };
+    let (name, backbone) = (&method.name, &method.backbone);
+    format!("{name:<26}{backbone:<20}{dimension:>6}  {state:<9}{}\n", method.paper)
+}
+
+fn everything(method: &Method, roots: &[PathBuf]) -> String {
+    let dimensions: Vec<_> = method.dimensions.iter().map(ToString::to_string).collect();
+    let dimension = method.dimensions[0];
+    let place = method
+        .locate(dimension, roots)
+        .map_or("absent".to_owned(), |path| path.display().to_string());
+    let preprocessing = method.preprocessing();
+    let size = match preprocessing.size {
+        Size::Fixed { height, width } => format!("height {height}, width {width}"),
+        Size::ShorterSide(side) => format!("shorter side {side}"),
+        Size::Native => "as they are".to_owned(),
+        Size::NativeMultipleOf(step) => format!("as they are, to multiples of {step}"),
+    };
+    let filter = match preprocessing.interpolation {
+        Interpolation::BilinearOpenCv => "bilinear without antialiasing, as OpenCV",
+        Interpolation::Bilinear => "bilinear with antialiasing, as Pillow",
+        Interpolation::Bicubic => "bicubic with antialiasing, as Pillow",
+        Interpolation::Nearest => "nearest",
+    };
+    let order = if preprocessing.resize_after_normalize { "after" } else { "before" };
+    let (mean, std) = (preprocessing.mean, preprocessing.std);
+    let rows = [
+        ("paper", method.paper.clone()),
+        ("backbone", method.backbone.clone()),
+        ("dimensions", dimensions.join(", ")),
+        ("images", format!("{size}; {filter}; resized {order} normalisation")),
+        ("input", format!("{:?}, mean {mean:?}, std {std:?}", preprocessing.channels)),
+        ("weights", method.file(dimension)),
+        ("origin", method.origin(dimension)),
+        ("licence", method.licence.clone().unwrap_or_else(|| "none stated".to_owned())),
+        ("digest", method.digest.clone().unwrap_or_else(|| "not known".to_owned())),
+        ("at hand", place),
+        ("checked", method.checked.clone()),
+    ];
+    rows.iter().map(|(key, value)| format!("{key:<12}{value}\n")).collect()
+}

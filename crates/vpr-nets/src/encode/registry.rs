@@ -1,0 +1,292 @@
+//! The published checkpoints by name: `data/weights.toml`.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use vpr_core::Error;
+
+use super::{Channels, Interpolation, Preprocessing, Size};
+use crate::Result;
+
+/// One entry of `data/weights.toml`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Method {
+    /// What `--method` takes.
+    pub name: String,
+    /// What `--method` takes together with `--backbone`; the name if there is no other.
+    family: Option<String>,
+    /// Which network it is.
+    pub architecture: Architecture,
+    /// Its backbone, as VPR-methods-evaluation writes it; empty if it has no choice.
+    #[serde(default)]
+    pub backbone: String,
+    /// Lengths of the descriptor there are files for, the usual one first.
+    pub dimensions: Vec<usize>,
+    file: String,
+    origin: String,
+    /// Licence of the weights, or where it is stated; `None` if none is stated.
+    pub licence: Option<String>,
+    /// Length of the file, if it was at hand.
+    pub size_bytes: Option<u64>,
+    /// `sha256:…` of the file, if it was at hand.
+    pub digest: Option<String>,
+    /// What it was published with.
+    pub paper: String,
+    /// What was run of it here.
+    #[serde(default)]
+    pub checked: String,
+    size: Option<SizeEntry>,
+    #[serde(default)]
+    interpolation: InterpolationEntry,
+    #[serde(default)]
+    channels: ChannelsEntry,
+    mean: Option<[f32; 3]>,
+    std: Option<[f32; 3]>,
+    #[serde(default)]
+    resize: ResizeEntry,
+}
+
+/// The networks that are built here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Architecture {
+    /// The small network this project trains.
+    Default,
+    /// NetVLAD on ten blocks of MobileNetV2.
+    NetVladMobileNetV2,
+    /// The mean of EfficientNet-Lite0's feature map.
+    EfficientNetLite0,
+    /// `BoQ` on DINOv2 ViT-B/14.
+    BoqDinov2,
+    /// `BoQ` on ResNet-50 cropped after `layer3`.
+    BoqResnet50,
+    /// SALAD on DINOv2 ViT-B/14.
+    Salad,
+    /// MixVPR on ResNet-50 cropped after `layer3`.
+    MixVpr,
+    /// CosPlace.
+    CosPlace,
+    /// EigenPlaces.
+    EigenPlaces,
+    /// NetVLAD on VGG16.
+    NetVlad,
+    /// `CricaVPR` on DINOv2 ViT-B/14.
+    CricaVpr,
+    /// GeM on ResNet-50.
+    GemResNet50,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(untagged)]
+enum SizeEntry {
+    Fixed([usize; 2]),
+    ShorterSide(usize),
+    Native(Native),
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Native {
+    Native,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum InterpolationEntry {
+    BilinearOpencv,
+    #[default]
+    Bilinear,
+    Bicubic,
+    Nearest,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum ChannelsEntry {
+    #[default]
+    Rgb,
+    Bgr,
+    Gray,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum ResizeEntry {
+    #[default]
+    BeforeNormalize,
+    AfterNormalize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Registry {
+    method: Vec<Method>,
+}
+
+/// All methods, in the order of the file.
+///
+/// # Panics
+///
+/// Never: the file is part of the program and tested.
+#[must_use]
+pub fn methods() -> Vec<Method> {
+    let text = include_str!("../../../../data/weights.toml");
+    toml::from_str::<Registry>(text).expect("data/weights.toml is tested").method
+}
+
+impl Method {
+    /// The method of this name; `backbone` chooses among those of a family.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Unknown`] with the names there are.
+    pub fn find(name: &str, backbone: Option<&str>) -> Result<Self> {
+        let methods = methods();
+        let matches = |method: &&Method| match backbone {
+            None => method.name == name,
+            Some(backbone) => {
+                (method.name == name || method.family() == name)
+                    && method.backbone.eq_ignore_ascii_case(backbone)
+            }
+        };
+        if let Some(method) = methods.iter().find(matches) {
+            return Ok(method.clone());
+        }
+        let of_family: Vec<_> =
+            methods.iter().filter(|it| it.name == name || it.family() == name).collect();
+        let (kind, name, known): (_, _, Vec<_>) = match backbone {
+            Some(backbone) if !of_family.is_empty() => {
+                let known = of_family.iter().map(|it| it.backbone.as_str()).collect();
+                ("backbone", backbone, known)
+            }
+            _ => ("method", name, methods.iter().map(|it| it.name.as_str()).collect()),
+        };
+        Err(Error::Unknown { kind, name: name.to_owned(), known: known.join(", ") }.into())
+    }
+
+    /// What `--method` takes together with `--backbone`.
+    #[must_use]
+    pub fn family(&self) -> &str {
+        self.family.as_deref().unwrap_or(&self.name)
+    }
+
+    /// The chosen length of the descriptor, or the usual one.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Unknown`] if there is no file for it.
+    pub fn dimension(&self, chosen: Option<usize>) -> Result<usize> {
+        match chosen {
+            None => Ok(self.dimensions[0]),
+            Some(chosen) if self.dimensions.contains(&chosen) => Ok(chosen),
+            Some(chosen) => {
+                let known: Vec<_> = self.dimensions.iter().map(ToString::to_string).collect();
+                let (kind, name) = ("dimension of its descriptors", chosen.to_string());
+                Err(Error::Unknown { kind, name, known: known.join(", ") }.into())
+            }
+        }
+    }
+
+    /// What its file is called.
+    #[must_use]
+    pub fn file(&self, dimension: usize) -> String {
+        self.file.replace("{dimension}", &dimension.to_string())
+    }
+
+    /// Where its file is from.
+    #[must_use]
+    pub fn origin(&self, dimension: usize) -> String {
+        self.origin.replace("{dimension}", &dimension.to_string())
+    }
+
+    /// Its file in `weights/` or `models/` of one of these folders.
+    #[must_use]
+    pub fn locate(&self, dimension: usize, roots: &[PathBuf]) -> Option<PathBuf> {
+        let file = self.file(dimension);
+        let place = |root: &PathBuf| ["weights", "models"].map(|it| root.join(it).join(&file));
+        roots.iter().flat_map(place).find(|path| path.is_file())
+    }
+
+    /// [`Self::locate`], or why it is not there.
+    pub(super) fn weights(
+        &self,
+        given: Option<&Path>,
+        dimension: usize,
+        roots: &[PathBuf],
+    ) -> Result<PathBuf> {
+        if let Some(path) = given {
+            return Ok(path.to_owned());
+        }
+        self.locate(dimension, roots).ok_or_else(|| {
+            let searched: Vec<_> = roots.iter().map(|it| it.display().to_string()).collect();
+            let reason = format!(
+                "not in weights/ or models/ of {}; it is from {}",
+                searched.join(", "),
+                self.origin(dimension)
+            );
+            crate::Error::format(self.file(dimension), "weights", reason)
+        })
+    }
+
+    /// How images become its input.
+    #[must_use]
+    pub fn preprocessing(&self) -> Preprocessing {
+        let usual = Preprocessing::image_net(224, 224);
+        Preprocessing {
+            size: match self.size {
+                Some(SizeEntry::Fixed([height, width])) => Size::Fixed { height, width },
+                Some(SizeEntry::ShorterSide(side)) => Size::ShorterSide(side),
+                Some(SizeEntry::Native(Native::Native)) => Size::Native,
+                None => usual.size,
+            },
+            interpolation: match self.interpolation {
+                InterpolationEntry::BilinearOpencv => Interpolation::BilinearOpenCv,
+                InterpolationEntry::Bilinear => Interpolation::Bilinear,
+                InterpolationEntry::Bicubic => Interpolation::Bicubic,
+                InterpolationEntry::Nearest => Interpolation::Nearest,
+            },
+            channels: match self.channels {
+                ChannelsEntry::Rgb => Channels::Rgb,
+                ChannelsEntry::Bgr => Channels::Bgr,
+                ChannelsEntry::Gray => Channels::Gray,
+            },
+            mean: self.mean.unwrap_or(usual.mean),
+            std: self.std.unwrap_or(usual.std),
+            resize_after_normalize: matches!(self.resize, ResizeEntry::AfterNormalize),
+            ..usual
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_means_one_method() {
+        let mut names: Vec<_> = methods().into_iter().map(|it| it.name).collect();
+        let n_names = names.len();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), n_names);
+    }
+
+    #[test]
+    fn a_backbone_chooses_within_a_family() {
+        assert_eq!(Method::find("cosplace", None).unwrap().backbone, "ResNet50");
+        let small = Method::find("cosplace", Some("resnet18")).unwrap();
+        assert_eq!(small.name, "cosplace-resnet18");
+        assert_eq!(small.file(512), "ResNet18_512_cosplace.pth");
+        assert_eq!(Method::find("boq", Some("Dinov2")).unwrap().name, "boq-dinov2");
+    }
+
+    #[test]
+    fn what_there_is_not_is_refused_with_what_there_is() {
+        let unknown = Method::find("cosplace", Some("GoogLeNet")).unwrap_err().to_string();
+        assert!(unknown.contains("unknown backbone `GoogLeNet`") && unknown.contains("ResNet18"));
+        assert!(Method::find("coplace", None).unwrap_err().to_string().contains("cosplace"));
+        let dimension = Method::find("cosplace", None).unwrap().dimension(Some(33)).unwrap_err();
+        assert!(dimension.to_string().contains("2048"), "{dimension}");
+    }
+}
