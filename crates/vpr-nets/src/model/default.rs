@@ -7,7 +7,7 @@ use std::path::Path;
 
 use burn::{
     config::Config,
-    module::Module,
+    module::{Module, Param},
     nn::{GroupNorm, GroupNormConfig, Linear, LinearConfig, PaddingConfig2d},
     store::{BurnToPyTorchAdapter, ModuleSnapshot, PyTorchToBurnAdapter, SafetensorsStore},
     tensor::{Device, Tensor, TensorData, activation::relu},
@@ -85,7 +85,7 @@ impl DefaultEncoderConfig {
     #[must_use]
     pub fn init(&self, device: &Device) -> DefaultEncoder {
         let trunk = self.trunk(device);
-        let head = LinearConfig::new(self.pooled(), self.dimension).with_bias(false).init(device);
+        let head = LinearConfig::new(self.pooled(), self.dimension).init(device);
         DefaultEncoder { trunk, head }
     }
 
@@ -122,6 +122,21 @@ impl DefaultEncoder {
     #[must_use]
     pub fn project(&self, pooled: Tensor<2>) -> Tensor<2> {
         unit_rows(self.head.forward(pooled))
+    }
+
+    /// Sets the projection so that these images' pooled features enter it with mean 0 and variance 1,
+    /// feature by feature. Pooled features of random weights are nearly the same for all images;
+    /// training would spend its first thousand steps on what they share.
+    #[must_use]
+    pub fn centred(mut self, images: Tensor<4>) -> Self {
+        let pooled = self.trunk.forward(images).detach();
+        let mean = pooled.clone().mean_dim(0);
+        let deviation = (pooled - mean.clone()).square().mean_dim(0).sqrt() + 1e-3;
+        let weight = self.head.weight.val().detach() / deviation.transpose();
+        let bias = mean.matmul(weight.clone()).neg().flatten(0, 1);
+        self.head.weight = Param::from_tensor(weight);
+        self.head.bias = Some(Param::from_tensor(bias));
+        self
     }
 
     /// Reads weights as [`Self::save`] writes them.
@@ -329,6 +344,18 @@ mod tests {
         let gap: f32 =
             (network.forward(images) - network.forward(coloured)).abs().max().into_scalar();
         assert!(gap < 1e-2, "{gap}");
+    }
+
+    #[test]
+    fn centring_takes_away_what_all_images_share() {
+        let network = DefaultEncoderConfig::new().init(&Device::flex());
+        let images = images(8);
+        let mean_similarity = |network: &DefaultEncoder| -> f32 {
+            network.forward(images.clone()).mean_dim(0).square().sum().into_scalar()
+        };
+        assert!(mean_similarity(&network) > 0.5);
+        let centred = network.clone().centred(images.clone());
+        assert!(mean_similarity(&centred) < 0.2);
     }
 
     #[test]

@@ -1,0 +1,159 @@
+//! `default-encoder train`.
+
+use std::{
+    fs::{self, OpenOptions},
+    io::Write,
+    path::{Path, PathBuf},
+};
+
+use anyhow::Context;
+use vpr_core::cli::{self, Outcome};
+use vpr_nets::{
+    model::default::{DefaultEncoder, DefaultEncoderConfig, INPUT},
+    train::{Checkpoint, Descent, Optimizer, Report, Schedule, seeded},
+};
+
+use crate::{
+    batches::{Sizes, batch},
+    cities,
+    pixels::Album,
+    validate,
+};
+
+/// Steps between two lines of the log.
+const LOG_EVERY: usize = 25;
+/// Steps between two validations.
+const VALIDATE_EVERY: usize = 250;
+
+/// What to train, on how much.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The weights to write; the log lands beside them
+    #[arg(long, value_name = "FILE", default_value = "data/models/default-encoder.safetensors")]
+    output: PathBuf,
+    /// Folder that keeps rendered worlds
+    #[arg(long, env = "VPR_CACHE", value_name = "DIR", default_value = "data/worlds")]
+    cache: PathBuf,
+    /// Folder of checkpoints
+    #[arg(long, value_name = "DIR", default_value = "target/default-encoder")]
+    checkpoints: PathBuf,
+    /// Decides cities, weights and batches
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Number of cities
+    #[arg(long, default_value_t = 40)]
+    cities: usize,
+    /// Number of steps
+    #[arg(long, default_value_t = 4_000)]
+    steps: usize,
+    /// Places in a step, a multiple of 4
+    #[arg(long, default_value_t = 16)]
+    places: usize,
+    /// Images of each of them, up to 4
+    #[arg(long, default_value_t = 4)]
+    views: usize,
+    /// Highest learning rate
+    #[arg(long, default_value_t = 1e-3)]
+    rate: f64,
+    /// Render the cities and stop
+    #[arg(long)]
+    render_only: bool,
+}
+
+pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let cities = cities::open(args.cities, args.seed, &args.cache)?;
+    let trial = validate::Trial::open(&args.cache)?;
+    if args.render_only {
+        return Ok(Outcome::Success);
+    }
+    let albums =
+        cities.iter().map(|city| Album::read(&city.images)).collect::<anyhow::Result<Vec<_>>>()?;
+    let descent = Descent {
+        steps: args.steps,
+        schedule: Schedule::Cosine {
+            rate: args.rate,
+            last: 0.01 * args.rate,
+            warmup: args.steps.div_ceil(20).min(200),
+            steps: args.steps,
+        },
+        optimizer: Optimizer::AdamW { decay: 0.01 },
+        save_every: 50,
+    };
+    let sizes = Sizes { input: INPUT, places: args.places, views: args.views };
+    let device = vpr_nets::train::device();
+    let fresh = seeded(DefaultEncoderConfig::new().init(&device), args.seed);
+    let first = batch(&albums, sizes, args.seed, args.steps);
+    let mut log = Log::open(args.output.with_extension("log.csv"), &args.checkpoints)?;
+    let network = descent.run(
+        fresh.centred(first.tensor(&device)),
+        &Checkpoint::new(&args.checkpoints),
+        |step| Ok(batch(&albums, sizes, args.seed, step)),
+        |report, network| log.note(report, network, &trial),
+    )?;
+    save(&network, args)?;
+    cli::note(&format!("generated: {}", args.output.display()));
+    Ok(Outcome::Success)
+}
+
+/// Writes the weights under a temporary name, then renames.
+fn save(network: &DefaultEncoder, args: &Args) -> anyhow::Result<()> {
+    let partial = args.output.with_extension("partial.safetensors");
+    let facts = [
+        ("trained_on", format!("{} generated street cities", args.cities)),
+        ("seed", args.seed.to_string()),
+        ("steps", args.steps.to_string()),
+        ("input", format!("{} x {}, RGB in 0 to 1", INPUT.0, INPUT.1)),
+        ("licence", "MIT OR Apache-2.0".to_owned()),
+    ];
+    let pairs: Vec<(&str, &str)> =
+        facts.iter().map(|(key, value)| (*key, value.as_str())).collect();
+    network.save(&partial, &pairs)?;
+    fs::rename(&partial, &args.output).with_context(|| args.output.display().to_string())
+}
+
+/// The log: a line every [`LOG_EVERY`] steps, rewritten from the checkpoint on when resumed.
+struct Log {
+    path: PathBuf,
+    sum: f64,
+    n: usize,
+}
+
+impl Log {
+    fn open(path: PathBuf, checkpoints: &Path) -> anyhow::Result<Self> {
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        }
+        if !checkpoints.exists() || !path.exists() {
+            let head = "step,loss,learning_rate,recall_at_1_unseen_streets\n";
+            fs::write(&path, head).with_context(|| path.display().to_string())?;
+        }
+        Ok(Self { path, sum: 0.0, n: 0 })
+    }
+
+    fn note(
+        &mut self,
+        report: &Report,
+        network: &DefaultEncoder,
+        trial: &validate::Trial,
+    ) -> vpr_core::Result<()> {
+        self.sum += report.loss;
+        self.n += 1;
+        if !report.step.is_multiple_of(LOG_EVERY) {
+            return Ok(());
+        }
+        let recall = if report.step.is_multiple_of(VALIDATE_EVERY) {
+            format!("{:.4}", trial.recall(network)?)
+        } else {
+            String::new()
+        };
+        let loss = self.sum / self.n as f64;
+        let line = format!("{},{loss:.4},{:.2e},{recall}\n", report.step, report.rate);
+        cli::note(line.trim_end());
+        (self.sum, self.n) = (0.0, 0);
+        OpenOptions::new()
+            .append(true)
+            .open(&self.path)
+            .and_then(|mut file| file.write_all(line.as_bytes()))
+            .map_err(vpr_core::Error::io(&self.path))
+    }
+}
