@@ -13,12 +13,12 @@ pub(crate) fn augment(image: Pixels<'_>, size: (usize, usize), seed: u64, output
     if random.random_bool(0.3) {
         blur(output, size);
     }
-    let noise = if random.random_bool(0.5) { random.random_range(0.0..0.06) } else { 0.0 };
+    let noise = if random.random_bool(0.5) { random.random_range(0.0..0.04) } else { 0.0 };
     for value in output.iter_mut() {
         let draw: f32 = random.random::<f32>() + random.random::<f32>() - 1.0;
         *value = (*value + noise * draw).clamp(0.0, 1.0);
     }
-    if random.random_bool(0.3) {
+    if random.random_bool(0.2) {
         erase(output, size, &mut random);
     }
 }
@@ -30,7 +30,7 @@ fn crop(
     random: &mut ChaCha8Rng,
     output: &mut [f32],
 ) {
-    let scale = random.random_range(0.78..1.0_f32);
+    let scale = random.random_range(0.82..1.0_f32);
     let stretch = random.random_range(0.92..1.08_f32);
     let (from_width, from_height) = (image.width as f32, image.height as f32);
     let across = (scale * stretch).min(1.0) * from_width / width as f32;

@@ -7,7 +7,7 @@ use vpr_nets::train::Batch;
 
 use crate::{
     augment::augment,
-    cities::{AVENUES, PLACES, VIEWS},
+    cities::{AVENUES, PLACES, VISITS},
     pixels::Album,
 };
 
@@ -18,7 +18,7 @@ pub(crate) struct Sizes {
     pub(crate) input: (usize, usize),
     /// Places, a multiple of [`FROM_ONE_CITY`].
     pub(crate) places: usize,
-    /// Images of each place, up to [`VIEWS`].
+    /// Images of each place, up to [`VISITS`].
     pub(crate) views: usize,
 }
 
@@ -38,10 +38,10 @@ pub(crate) fn batch(cities: &[Album], sizes: Sizes, seed: u64, step: usize) -> B
     let mut number = 0;
     for city in order.into_iter().cycle().take(sizes.places / FROM_ONE_CITY) {
         for place in apart(&mut random) {
-            let mut views: Vec<usize> = (0..VIEWS).collect();
+            let mut views: Vec<usize> = (0..VISITS).collect();
             views.shuffle(&mut random);
             for view in views.into_iter().take(sizes.views) {
-                chosen.push((city, place * VIEWS + view, number, random.random::<u64>()));
+                chosen.push((city, place * VISITS + view, number, random.random::<u64>()));
             }
             number += 1;
         }

@@ -1,126 +1,122 @@
-//! The cities of training: generated streets, each place seen four times.
+//! The cities of training: generated streets, each place photographed on several visits.
 
-use std::path::{Path, PathBuf};
+use std::{fs, path::Path};
 
 use anyhow::Context;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use vpr_core::cli;
-use vpr_worlds::{Side, World, recipe_with};
+use vpr_worlds::{RENDERER, Recipe, Traverse, photograph_city, recipe_with};
+
+use crate::pixels::Album;
 
 /// Places of a city.
 pub(crate) const PLACES: usize = 80;
-/// Images of a place: two drives through the first world of a city, two through its second.
-pub(crate) const VIEWS: usize = 4;
+/// Visits to it: each gives one image of every place.
+pub(crate) const VISITS: usize = 5;
 /// Avenues of a city: a quarter of the places lies on each.
 pub(crate) const AVENUES: usize = 4;
 /// Seed of the first city; the worlds that come with `vpr-worlds` have seeds below.
 const FIRST_SEED: u64 = 5_001;
+/// Width and height of an image: a crop of it becomes the network's input.
+const SIZE: (usize, usize) = (160, 120);
 
-/// The images of one city: `PLACES × VIEWS` paths, a place's views beside each other.
-pub(crate) struct City {
-    pub(crate) images: Vec<PathBuf>,
-}
-
-/// Renders the cities that are not in the cache yet and lists their images.
-pub(crate) fn open(n: usize, seed: u64, cache: &Path) -> anyhow::Result<Vec<City>> {
-    let bar = cli::progress("cities", n * PLACES * VIEWS);
-    let mut cities = Vec::with_capacity(n);
+/// The cities, rendered unless the cache has them: `PLACES × VISITS` images each, a place's visits
+/// beside each other.
+pub(crate) fn open(n: usize, seed: u64, cache: &Path) -> anyhow::Result<Vec<Album>> {
+    fs::create_dir_all(cache).with_context(|| cache.display().to_string())?;
+    let bar = cli::progress("cities", n);
+    let mut albums = Vec::with_capacity(n);
     for city in 0..n as u64 {
-        let mut sides = Vec::with_capacity(VIEWS);
-        for half in 0..2 {
-            let settings = settings(seed, city, half);
-            let pairs: Vec<(&str, &str)> =
-                settings.iter().map(|(key, value)| (*key, value.as_str())).collect();
-            let recipe = recipe_with("world/train-city", &pairs)?;
-            let world = World::open(&recipe, cache, &|| bar.inc(1))
-                .with_context(|| format!("city {city}"))?;
-            for side in [Side::References, Side::Queries] {
-                sides.push(world.images(side)?);
-            }
-        }
-        let images =
-            (0..PLACES).flat_map(|place| sides.iter().map(move |side| side[place].clone()));
-        cities.push(City { images: images.collect() });
+        let path = cache.join(format!("training-{RENDERER}-{seed}-{city}.rgb"));
+        let bytes = match fs::read(&path) {
+            Ok(bytes) if bytes.len() == PLACES * VISITS * 3 * SIZE.0 * SIZE.1 => bytes,
+            _ => render(seed, city, &path)?,
+        };
+        albums.push(Album::new(bytes, SIZE));
+        bar.inc(1);
     }
     bar.finish_and_clear();
-    Ok(cities)
+    Ok(albums)
 }
 
-/// How the recipe of one half of a city differs from `world/train-city`.
-fn settings(seed: u64, city: u64, half: u64) -> Vec<(&'static str, String)> {
-    let mut layout = ChaCha8Rng::seed_from_u64(seed ^ (2 * city + 1));
-    let mut within = |low: f64, high: f64| format!("{:.3}", layout.random_range(low..high));
-    let mut settings = vec![
-        ("seed", (FIRST_SEED + city).to_string()),
-        ("layout", "\"vpr-bench\"".to_owned()),
-        ("tolerance", "{ frames = 0 }".to_owned()),
-        ("places", PLACES.to_string()),
-        ("camera.width", "160".to_owned()),
-        ("camera.height", "120".to_owned()),
+fn render(seed: u64, city: u64, path: &Path) -> anyhow::Result<Vec<u8>> {
+    let photographs = photograph_city(&recipe(seed, city)?, &visits(seed, city))?;
+    let bytes: Vec<u8> =
+        photographs.into_iter().flat_map(|photograph| photograph.image.into_raw()).collect();
+    let partial = path.with_extension("partial");
+    fs::write(&partial, &bytes).with_context(|| partial.display().to_string())?;
+    fs::rename(&partial, path).with_context(|| path.display().to_string())?;
+    Ok(bytes)
+}
+
+/// Streets and camera of a city.
+fn recipe(seed: u64, city: u64) -> anyhow::Result<Recipe> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(2 * city);
+    let side = if random.random_bool(0.5) { 1.0 } else { -1.0 };
+    let mut within = |low: f64, high: f64| random.random_range(low..high);
+    let numbers = [
         ("camera.focal", within(95.0, 145.0)),
         ("street.spacing_m", within(22.0, 28.0)),
+        ("street.heading_deg", side * within(12.0, 80.0)),
+        ("street.trees", within(0.15, 0.7)),
+        ("street.eye_m", within(1.5, 2.5)),
+    ];
+    let mut settings: Vec<(&str, String)> =
+        numbers.iter().map(|(key, value)| (*key, format!("{value:.3}"))).collect();
+    settings.extend([
+        ("seed", (FIRST_SEED + city).to_string()),
+        ("places", PLACES.to_string()),
+        ("camera.width", SIZE.0.to_string()),
+        ("camera.height", SIZE.1.to_string()),
         ("street.avenues", AVENUES.to_string()),
-        ("street.heading_deg", within(-100.0, 100.0)),
-        ("street.trees", within(0.15, 0.75)),
-        ("street.eye_m", within(1.4, 2.6)),
-    ];
-    let mut drive = ChaCha8Rng::seed_from_u64(seed ^ (1 << 32) ^ (2 * city + half));
-    let mut chance = |share: f64| drive.random_bool(share);
-    let kinds = [
-        [half == 1 && chance(0.4), chance(0.15), chance(0.4)],
-        [half == 1 && chance(0.6), chance(0.25), chance(0.4)],
-    ];
-    for (side, [night, snow, fog]) in ["references", "queries"].into_iter().zip(kinds) {
-        settings.extend(traverse(side, [night, snow, fog], half, &mut drive));
-    }
-    settings
+    ]);
+    let pairs: Vec<(&str, &str)> =
+        settings.iter().map(|(key, value)| (*key, value.as_str())).collect();
+    Ok(recipe_with("train-city", &pairs)?)
 }
 
-/// Light, weather and viewpoint of one drive.
-fn traverse(
-    side: &'static str,
-    [night, snow, fog]: [bool; 3],
-    half: u64,
-    random: &mut ChaCha8Rng,
-) -> Vec<(&'static str, String)> {
-    let mut within = |low: f64, high: f64| format!("{:.3}", random.random_range(low..high));
-    let mut numbers = vec![
-        ("condition.cloud", within(0.0, 1.0)),
-        ("condition.sun_elevation_deg", within(8.0, 65.0)),
-        ("condition.sun_azimuth_deg", within(0.0, 360.0)),
-        ("condition.autumn", within(0.0, 0.9)),
-        ("condition.traffic", within(0.1, 0.9)),
-        ("condition.changed", within(0.0, 0.35)),
-        ("offset.lateral_m", within(-1.8, 1.8)),
-        ("offset.yaw_deg", within(-14.0, 14.0)),
-        ("offset.pitch_deg", within(-3.0, 5.0)),
-        ("offset.jitter", within(0.4, 1.4)),
-        ("film.blur_px", within(0.0, 0.6)),
-        ("film.noise", within(0.002, 0.03)),
-    ];
-    if half == 1 {
-        numbers.push(("condition.bare", within(0.0, 1.0)));
-        numbers.push(("condition.occlusion", within(0.0, 0.2)));
-    }
-    if night {
-        numbers.push(("condition.darkness", within(0.6, 1.0)));
-        numbers.push(("condition.headlights", within(0.0, 5.0)));
-        numbers.push(("condition.max_gain", within(5.0, 12.0)));
-    }
-    if snow {
-        numbers.push(("condition.snow", within(0.3, 1.0)));
-        numbers.push(("condition.falling", within(0.0, 0.5)));
-    }
-    if fog {
-        numbers.push(("condition.visibility_m", within(60.0, 600.0)));
-    }
-    numbers.into_iter().map(|(key, value)| (name(side, key), value)).collect()
+/// Light, weather and viewpoint of every visit: two by day, one under clouds, one that is often by
+/// night, one that is often in snow or fog.
+fn visits(seed: u64, city: u64) -> Vec<Traverse> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(2 * city + 1);
+    (0..VISITS).map(|number| visit(number, &mut random)).collect()
 }
 
-/// The full key of a traverse's number.
-fn name(side: &str, key: &str) -> &'static str {
-    Box::leak(format!("{side}.{key}").into_boxed_str())
+fn visit(number: usize, random: &mut ChaCha8Rng) -> Traverse {
+    let mut visit = Traverse::default();
+    let condition = &mut visit.condition;
+    condition.cloud = if number == 2 { 0.95 } else { random.random_range(0.0..0.8) };
+    condition.sun_elevation_deg = random.random_range(10.0..65.0);
+    condition.sun_azimuth_deg = random.random_range(0.0..360.0);
+    condition.autumn = random.random_range(0.0..0.8);
+    condition.traffic = random.random_range(0.1..0.9);
+    condition.changed = random.random_range(0.0..0.3);
+    if number == 3 && random.random_bool(0.7) {
+        condition.darkness = random.random_range(0.4..1.0);
+        condition.headlights = random.random_range(0.0..5.0);
+        condition.max_gain = random.random_range(5.0..12.0);
+    }
+    if number == 4 && random.random_bool(0.5) {
+        condition.snow = random.random_range(0.3..1.0);
+        condition.bare = random.random_range(0.0..1.0);
+        condition.falling = random.random_range(0.0..0.4);
+    }
+    if number == 4 && random.random_bool(0.5) {
+        condition.visibility_m = random.random_range(70.0..500.0);
+    }
+    if number == 1 {
+        condition.occlusion = random.random_range(0.0..0.15);
+    }
+    visit.offset.lateral_m = random.random_range(-1.5..1.5);
+    visit.offset.yaw_deg = random.random_range(-8.0..8.0);
+    visit.offset.pitch_deg = random.random_range(-2.0..4.0);
+    visit.offset.jitter = random.random_range(0.2..0.9);
+    visit.film.blur_px = random.random_range(0.0..0.5);
+    visit.film.noise = random.random_range(0.002..0.015);
+    visit
 }
 
 #[cfg(test)]
@@ -128,18 +124,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_city_is_a_valid_recipe_and_both_halves_share_its_houses() {
+    fn every_city_is_a_valid_street_with_seeds_of_its_own() {
         for city in 0..40 {
-            let mut seeds = Vec::new();
-            for half in 0..2 {
-                let settings = settings(7, city, half);
-                let pairs: Vec<(&str, &str)> =
-                    settings.iter().map(|(key, value)| (*key, value.as_str())).collect();
-                let recipe = recipe_with("world/train-city", &pairs).unwrap();
-                seeds.push((recipe.seed, recipe.street, recipe.camera));
-                assert!(recipe.seed > 5_000 && recipe.rail.is_none());
-            }
-            assert_eq!(seeds[0], seeds[1]);
+            let recipe = recipe(7, city).unwrap();
+            assert!(recipe.seed > 5_000 && recipe.street.is_some());
+            assert_eq!(visits(7, city).len(), VISITS);
+            assert_eq!(visits(7, city), visits(7, city));
         }
+        assert_ne!(visits(7, 0), visits(7, 1));
     }
 }

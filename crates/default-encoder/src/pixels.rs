@@ -49,19 +49,9 @@ impl Pixels<'_> {
 }
 
 impl Album {
-    /// Decodes images that all have the size of the first.
-    pub(crate) fn read(paths: &[PathBuf]) -> anyhow::Result<Self> {
-        let (width, height) = decode(paths.first().context("no images")?)?.dimensions();
-        let each = 3 * (width * height) as usize;
-        let mut bytes = vec![0; each * paths.len()];
-        bytes.par_chunks_mut(each).zip(paths).try_for_each(|(bytes, path)| {
-            let image = decode(path)?;
-            let same = image.dimensions() == (width, height);
-            ensure!(same, "{}: not {width} × {height} pixels", path.display());
-            bytes.copy_from_slice(image.as_raw());
-            anyhow::Ok(())
-        })?;
-        Ok(Self { bytes, width: width as usize, height: height as usize })
+    /// Images of this width and height, back to back.
+    pub(crate) fn new(bytes: Vec<u8>, (width, height): (usize, usize)) -> Self {
+        Self { bytes, width, height }
     }
 
     pub(crate) fn get(&self, index: usize) -> Pixels<'_> {

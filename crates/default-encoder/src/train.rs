@@ -16,14 +16,13 @@ use vpr_nets::{
 use crate::{
     batches::{Sizes, batch},
     cities,
-    pixels::Album,
     validate,
 };
 
 /// Steps between two lines of the log.
 const LOG_EVERY: usize = 25;
 /// Steps between two validations.
-const VALIDATE_EVERY: usize = 250;
+const VALIDATE_EVERY: usize = 200;
 
 /// What to train, on how much.
 #[derive(clap::Args)]
@@ -49,7 +48,7 @@ pub(crate) struct Args {
     /// Places in a step, a multiple of 4
     #[arg(long, default_value_t = 16)]
     places: usize,
-    /// Images of each of them, up to 4
+    /// Images of each of them, up to 5
     #[arg(long, default_value_t = 4)]
     views: usize,
     /// Highest learning rate
@@ -61,13 +60,11 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let cities = cities::open(args.cities, args.seed, &args.cache)?;
+    let albums = cities::open(args.cities, args.seed, &args.cache)?;
     let trial = validate::Trial::open(&args.cache)?;
     if args.render_only {
         return Ok(Outcome::Success);
     }
-    let albums =
-        cities.iter().map(|city| Album::read(&city.images)).collect::<anyhow::Result<Vec<_>>>()?;
     let descent = Descent {
         steps: args.steps,
         schedule: Schedule::Cosine {
@@ -124,7 +121,7 @@ impl Log {
             fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
         }
         if !checkpoints.exists() || !path.exists() {
-            let head = "step,loss,learning_rate,recall_at_1_unseen_streets\n";
+            let head = "step,loss,learning_rate,recall_at_1_unseen_day,recall_at_1_unseen_night\n";
             fs::write(&path, head).with_context(|| path.display().to_string())?;
         }
         Ok(Self { path, sum: 0.0, n: 0 })
@@ -141,13 +138,13 @@ impl Log {
         if !report.step.is_multiple_of(LOG_EVERY) {
             return Ok(());
         }
-        let recall = if report.step.is_multiple_of(VALIDATE_EVERY) {
-            format!("{:.4}", trial.recall(network)?)
+        let recalls = if report.step.is_multiple_of(VALIDATE_EVERY) {
+            trial.recalls(network)?.map(|recall| format!("{recall:.4}")).join(",")
         } else {
-            String::new()
+            ",".to_owned()
         };
         let loss = self.sum / self.n as f64;
-        let line = format!("{},{loss:.4},{:.2e},{recall}\n", report.step, report.rate);
+        let line = format!("{},{loss:.4},{:.2e},{recalls}\n", report.step, report.rate);
         cli::note(line.trim_end());
         (self.sum, self.n) = (0.0, 0);
         OpenOptions::new()

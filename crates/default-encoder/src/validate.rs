@@ -131,14 +131,14 @@ impl Trial {
         Ok(Self { parts })
     }
 
-    /// Mean recall@1.
-    pub(crate) fn recall(&self, network: &DefaultEncoder) -> vpr_core::Result<f64> {
-        let mut sum = 0.0;
-        for (queries, references, truth) in &self.parts {
+    /// Recall@1 by day and by night.
+    pub(crate) fn recalls(&self, network: &DefaultEncoder) -> vpr_core::Result<[f64; 2]> {
+        let mut recalls = [0.0; 2];
+        for (recall, (queries, references, truth)) in recalls.iter_mut().zip(&self.parts) {
             let queries = network.describe(queries, INPUT, BATCH)?;
             let references = network.describe(references, INPUT, BATCH)?;
-            sum += recall_at(1, &retrieve(&queries, &references, 1)?, truth)?;
+            *recall = recall_at(1, &retrieve(&queries, &references, 1)?, truth)?;
         }
-        Ok(sum / self.parts.len() as f64)
+        Ok(recalls)
     }
 }

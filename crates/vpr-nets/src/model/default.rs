@@ -134,8 +134,8 @@ impl DefaultEncoder {
         let deviation = (pooled - mean.clone()).square().mean_dim(0).sqrt() + 1e-3;
         let weight = self.head.weight.val().detach() / deviation.transpose();
         let bias = mean.matmul(weight.clone()).neg().flatten(0, 1);
-        self.head.weight = Param::from_tensor(weight);
-        self.head.bias = Some(Param::from_tensor(bias));
+        self.head.weight = Param::from_tensor(weight.detach());
+        self.head.bias = Some(Param::from_tensor(bias.detach()));
         self
     }
 

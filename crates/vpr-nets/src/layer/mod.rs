@@ -1,0 +1,11 @@
+//! Layers shared by all networks; the one place that decides which implementation runs.
+
+mod conv2d;
+mod conv_norm;
+mod gradient;
+mod kernel;
+mod plain;
+
+pub use conv_norm::conv_norm;
+pub use conv2d::{Conv2d, Conv2dConfig};
+pub use kernel::Activation;
