@@ -25,6 +25,8 @@ enum Command {
     List(command::list::ListArgs),
     /// Make, convert, check and search reference maps on disk
     Map(command::map::MapArgs),
+    /// Match two images by local features: keypoints, matches, inliers, a picture
+    Match(Box<command::match_images::MatchArgs>),
     /// Say everything that is wrong with a dataset folder
     Validate(command::validate::ValidateArgs),
 }
@@ -35,6 +37,7 @@ fn main() -> ExitCode {
         Command::Evaluate(args) => command::evaluate::run(&args),
         Command::List(args) => command::list::run(&args),
         Command::Map(args) => command::map::run(&args),
+        Command::Match(args) => command::match_images::run(&args),
         Command::Validate(args) => command::validate::run(&args),
     })
 }

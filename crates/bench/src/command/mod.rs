@@ -3,6 +3,7 @@
 pub(crate) mod evaluate;
 pub(crate) mod list;
 pub(crate) mod map;
+pub(crate) mod match_images;
 pub(crate) mod predictions;
 pub(crate) mod run;
 pub(crate) mod validate;
