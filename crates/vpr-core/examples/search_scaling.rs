@@ -66,6 +66,7 @@ fn main() -> Result<()> {
         x_label: "references, log10".to_owned(),
         y_label: "milliseconds, log10".to_owned(),
         curves: curves.into(),
+        is_scatter: false,
     };
     let svg = Figure { panels: vec![panel] }.svg().map_err(anyhow::Error::msg)?;
     fs::create_dir_all(&folder)?;

@@ -4,7 +4,7 @@ mod hand_crafted;
 
 use serde::{Deserialize, Serialize};
 
-pub use hand_crafted::{Features, HandCrafted, Matched};
+pub use hand_crafted::{Describe, Features, HandCrafted, Matched};
 
 /// One of the ten techniques of the thesis.
 ///
