@@ -1,4 +1,5 @@
-//! `cargo bench -p vpr-core`: exact search by metric and batch, rows as f32, f16, int8 and signs.
+//! `cargo bench -p vpr-core`: exact search by metric and batch, rows as f32, f16, int8 and signs, maps
+//! on disk, searches near a position, and with `--features approximate` graphs.
 //!
 //! Machines differ in memory bandwidth more than in anything else: compare with `plain_read`, one
 //! pass over the same bytes.
@@ -10,18 +11,19 @@
     reason = "an example prints, and stops at the first error"
 )]
 
-use std::hint::black_box;
+use std::{hint::black_box, path::PathBuf};
 
 use divan::{Bencher, counter::BytesCount};
 use ndarray::Array2;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use vpr_core::{
-    Descriptors,
+    Descriptors, PlanarPosition, Poses,
     knn::{
-        F16Rows, Int8Rows, Metric, Pca, PcaParams, RowSource, SearchParams, SignRows, rescore,
-        search,
+        F16Rows, Int8Rows, Metric, Pca, PcaParams, PositionIndex, RowSource, SearchParams,
+        SignRows, rescore, search, search_among,
     },
+    map::{About, Access, MapFile, MapWriter, Opening, RowType},
 };
 
 const N_REFERENCES: usize = 20_000;
@@ -84,6 +86,68 @@ fn signs_rescored(bencher: Bencher<'_, '_>, batch: usize) {
         let candidates = signs.nearest(black_box(&query_signs), 100);
         rescore(&rows, &queries, &candidates, &SearchParams::default()).expect("valid")
     });
+}
+
+/// A map of the references in a folder that goes away.
+fn map_file(row_type: RowType) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.safetensors");
+    let mut writer = MapWriter::create(&path, DIM, row_type, About::default()).unwrap();
+    writer.append(unit_rows(N_REFERENCES).view(), None, None).unwrap();
+    writer.finish().unwrap();
+    (folder, path)
+}
+
+#[divan::bench(sample_count = 50)]
+fn open_a_map(bencher: Bencher<'_, '_>) {
+    let (_folder, path) = map_file(RowType::F32);
+    bencher.bench_local(|| MapFile::open(black_box(&path)).expect("a sound map"));
+}
+
+/// Checks every block on the way.
+#[divan::bench(args = [Access::Mapped, Access::Read], sample_count = 20)]
+fn first_query_from_disk(bencher: Bencher<'_, '_>, access: Access) {
+    let (_folder, path) = map_file(RowType::F32);
+    let (query, opening) = (unit_rows(1), Opening { access, trust: false });
+    bencher
+        .counter(BytesCount::of_many::<f32>(N_REFERENCES * DIM))
+        .with_inputs(|| MapFile::open_with(&path, opening).expect("a sound map"))
+        .bench_local_refs(|map| search(map, &query, &SearchParams::default()).expect("valid"));
+}
+
+#[divan::bench(args = [RowType::F32, RowType::F16, RowType::I8], sample_count = 10)]
+fn batch_from_disk(bencher: Bencher<'_, '_>, row_type: RowType) {
+    let (_folder, path) = map_file(row_type);
+    let map = MapFile::open_with(&path, Opening { access: Access::Read, trust: true });
+    run(bencher, &map.expect("a sound map"), Metric::Euclidean, 100);
+}
+
+#[divan::bench(sample_count = 10)]
+fn write_a_map(bencher: Bencher<'_, '_>) {
+    bencher.bench_local(|| map_file(RowType::F32));
+}
+
+/// One of a hundred references is within the radius.
+#[divan::bench(sample_count = 100)]
+fn near_a_position(bencher: Bencher<'_, '_>) {
+    let (rows, query) = (unit_rows(N_REFERENCES), unit_rows(1));
+    let position = |row: usize| PlanarPosition::new((row % 200) as f64, (row / 200) as f64);
+    let poses = Poses::Planar((0..N_REFERENCES).map(position).collect());
+    let index = PositionIndex::new(&poses).expect("finite");
+    bencher.bench_local(|| {
+        let among = index.within([100.0, 50.0, 0.0].into(), 8.0).expect("finite");
+        search_among(&rows, among, &query, &SearchParams::default()).expect("valid")
+    });
+}
+
+#[cfg(feature = "approximate")]
+#[divan::bench(args = [1, 100], sample_count = 20)]
+fn graph(bencher: Bencher<'_, '_>, batch: usize) {
+    use vpr_core::knn::{Hnsw, HnswParams};
+    let (rows, queries) = (unit_rows(N_REFERENCES), unit_rows(batch));
+    let graph = Hnsw::build(&rows, Metric::Euclidean, &HnswParams::default(), None);
+    let graph = graph.expect("valid");
+    bencher.bench_local(|| graph.search(&rows, black_box(&queries), 10).expect("valid"));
 }
 
 #[divan::bench(sample_count = 2)]

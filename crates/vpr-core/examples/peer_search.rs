@@ -1,7 +1,7 @@
 //! Our side of `experiments/peers/faiss_flat.py`: times one search per line of stdin.
 //!
 //! `peer_search <references.f32> <queries.f32> <dim>` reads two raw little-endian files, then obeys
-//! `time <metric> <batch> <threads>` (answers milliseconds), `read <threads>` (milliseconds of one
+//! `time <metric> <batch> <threads> [<rows per block>]` (answers milliseconds), `read <threads>` (milliseconds of one
 //! plain pass over the references) and `save <metric> <path>` (indices as u32, then distances).
 
 #![allow(
@@ -41,8 +41,9 @@ fn main() -> Result<()> {
     for line in io::stdin().lock().lines() {
         let line = line?;
         match line.split_whitespace().collect::<Vec<_>>().as_slice() {
-            ["time", metric, batch, threads] => {
-                let params = params(metric)?;
+            ["time", metric, batch, threads, block_rows @ ..] => {
+                let block_rows = block_rows.first().map(|rows| rows.parse()).transpose()?;
+                let params = SearchParams { block_rows, ..params(metric)? };
                 let batch = queries.view().slice(s![..batch.parse::<usize>()?, ..]).to_owned();
                 let batch = Descriptors::new(batch)?;
                 let start = Instant::now();

@@ -7,7 +7,7 @@
     reason = "a test fails by panicking and says what it skips"
 )]
 
-use std::ops::Range;
+use std::{ops::Range, sync::Mutex};
 
 use ndarray::{Array2, s};
 use proptest::prelude::*;
@@ -229,6 +229,51 @@ fn agrees_with_the_obvious_version_on_unit_descriptors() {
                 assert!((a - b).abs() <= 2.0 * f32::EPSILON * b.abs(), "{metric:?}: {a} {b}");
             }
         }
+    }
+}
+
+/// A source that likes to be read in pieces of its own, and remembers what was asked for.
+struct Pieces {
+    rows: Descriptors,
+    length: usize,
+    asked: Mutex<Vec<Range<usize>>>,
+}
+
+impl RowSource for Pieces {
+    fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    fn dim(&self) -> usize {
+        self.rows.dim()
+    }
+
+    fn piece_end(&self, start: usize, _wanted: usize) -> usize {
+        (start / self.length + 1) * self.length
+    }
+
+    fn block<'a>(&'a self, rows: Range<usize>, scratch: &'a mut Vec<f32>) -> Result<&'a [f32]> {
+        if rows.len() > 1 {
+            self.asked.lock().unwrap().push(rows.clone());
+        }
+        self.rows.block(rows, scratch)
+    }
+}
+
+#[test]
+fn every_piece_of_a_source_is_asked_for_once() {
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let (rows, queries) = (random(&mut rng, 1000, 16, uniform), random(&mut rng, 6, 16, uniform));
+    for (length, block_rows) in [(7, 64), (64, 7), (300, 64), (5000, 10)] {
+        let params = SearchParams { block_rows: Some(block_rows), ..SearchParams::default() };
+        let pieces = Pieces { rows: rows.clone(), length, asked: Mutex::default() };
+        let found = on_threads(2, || search(&pieces, &queries, &params)).unwrap();
+        assert_eq!(found, search(&rows, &queries, &params).unwrap());
+        let mut asked = pieces.asked.into_inner().unwrap();
+        asked.sort_unstable_by_key(|range| range.start);
+        let expected: Vec<Range<usize>> =
+            (0..1000).step_by(length).map(|start| start..(start + length).min(1000)).collect();
+        assert_eq!(asked, expected);
     }
 }
 

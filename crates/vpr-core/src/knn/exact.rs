@@ -1,8 +1,9 @@
 //! Exact search: fast scores choose the candidates, one slow routine orders them.
 
+use std::ops::Range;
 use std::sync::{
     Mutex,
-    atomic::{AtomicBool, AtomicUsize, Ordering},
+    atomic::{AtomicBool, Ordering},
 };
 
 use ndarray::Array2;
@@ -12,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Metric, RowSource,
     block::{Batch, Scorer},
+    margin::Margin,
     row,
     shortlist::{Candidate, Shortlist},
 };
@@ -50,7 +52,8 @@ const BLOCK_BYTES: usize = 128 << 10;
 /// errors excludes, and [`Metric::distance`] (f64, one order of summation) ranks the rest. Data with
 /// so many near-ties that the bound excludes little are searched at the speed of that routine.
 ///
-/// The references are read once for each 1024 queries, from the start to the end.
+/// The references are read once for each 1024 queries, from the start to the end; what a source
+/// checks when it is first touched is checked on the way.
 ///
 /// # Errors
 ///
@@ -130,24 +133,25 @@ fn key(
     Err(Error::NotFinite { what: "distance to a reference", row: query, column: index, value: key })
 }
 
-/// The blocks of a pass, handed out in order, and the first thing that went wrong.
+/// The references of a pass, handed out in order, and the first thing that went wrong.
 struct Blocks {
     n_rows: usize,
+    /// Rows that are scored at once, and asked for at once where the source does not mind.
     rows_per_block: usize,
-    next: AtomicUsize,
+    next: Mutex<usize>,
     stopped: AtomicBool,
     failures: Mutex<Vec<(usize, Error)>>,
 }
 
 impl Blocks {
     fn new(n_rows: usize, dim: usize, wanted: Option<usize>, n_threads: usize) -> Self {
-        // Measured: panels of 64 rows suit the matrix product, and a block should stay in the
-        // cache next to the queries.
-        let fitting = (BLOCK_BYTES / (size_of::<f32>() * dim.max(1))).clamp(64, 4096);
+        // Measured: the matrix product likes panels of 16 rows and more, and a block should stay
+        // in the cache next to the queries.
+        let fitting = (BLOCK_BYTES / (size_of::<f32>() * dim.max(1))).clamp(16, 4096);
         // Few references: smaller blocks, so that every thread gets some.
         let shared = n_rows.div_ceil(4 * n_threads).next_multiple_of(64);
         let rows_per_block = wanted.unwrap_or(fitting.min(shared)).max(1);
-        let (next, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let (next, stopped) = (Mutex::new(0), AtomicBool::new(false));
         Self { n_rows, rows_per_block, next, stopped, failures: Mutex::new(Vec::new()) }
     }
 
@@ -155,12 +159,18 @@ impl Blocks {
         self.n_rows.div_ceil(self.rows_per_block)
     }
 
-    fn take(&self) -> Option<std::ops::Range<usize>> {
+    /// The next piece: one block, or as many rows as the source reads or checks together.
+    fn take(&self, rows: &(impl RowSource + ?Sized)) -> Option<Range<usize>> {
         if self.stopped.load(Ordering::Relaxed) {
             return None;
         }
-        let start = self.next.fetch_add(1, Ordering::Relaxed).checked_mul(self.rows_per_block)?;
-        (start < self.n_rows).then(|| start..(start + self.rows_per_block).min(self.n_rows))
+        let mut next = self.next.lock().expect("no worker panics while it takes a piece");
+        let start = *next;
+        if start >= self.n_rows {
+            return None;
+        }
+        *next = rows.piece_end(start, self.rows_per_block).clamp(start + 1, self.n_rows);
+        Some(start..*next)
     }
 
     fn fail(&self, start: usize, error: Error) {
@@ -192,9 +202,9 @@ impl Worker {
         let shortlists = vec![Shortlist::new(k); batch.len()];
         let mut worker =
             Self { scorer: Scorer::new(), scratch: Vec::new(), row: Vec::new(), shortlists };
-        while let Some(range) = blocks.take() {
+        while let Some(range) = blocks.take(rows) {
             let start = range.start;
-            if let Err(error) = worker.scan(rows, batch, range) {
+            if let Err(error) = worker.scan(rows, batch, range, blocks.rows_per_block) {
                 blocks.fail(start, error);
             }
         }
@@ -205,26 +215,37 @@ impl Worker {
         &mut self,
         rows: &(impl RowSource + ?Sized),
         batch: &Batch<'_>,
-        range: std::ops::Range<usize>,
+        range: Range<usize>,
+        rows_per_block: usize,
     ) -> Result<()> {
-        let Self { scorer, scratch, row, shortlists } = self;
-        let block = rows.block(range.clone(), scratch)?;
-        scorer.score(batch, block, range.len(), |query, scores, margin| {
-            let list = &mut shortlists[query];
-            let cutoff = margin.cutoff(list.threshold());
-            for (run, first) in scores.chunks(RUN).zip((range.start..).step_by(RUN)) {
-                if run.iter().fold(true, |all, &score| all & dropped(score, cutoff)) {
-                    continue;
-                }
-                for (&score, index) in run.iter().zip(first..) {
-                    if !dropped(score, cutoff) {
-                        let (lower, upper) = (margin.lower(score), margin.upper(score));
-                        list.offer(Candidate { lower, upper, index });
-                    }
-                }
+        let piece = rows.block(range.clone(), &mut self.scratch)?;
+        let Self { scorer, row, shortlists, .. } = self;
+        for start in range.clone().step_by(rows_per_block) {
+            let end = (start + rows_per_block).min(range.end);
+            let values = (start - range.start) * rows.dim()..(end - range.start) * rows.dim();
+            scorer.score(batch, &piece[values], end - start, |query, scores, margin| {
+                let list = &mut shortlists[query];
+                offer(list, scores, margin, start);
+                list.prune(|index| key(rows, batch, query, index, row))
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// Offers the rows from `start` on whose scores do not exclude them.
+fn offer(list: &mut Shortlist, scores: &[f32], margin: Margin, start: usize) {
+    let cutoff = margin.cutoff(list.threshold());
+    for (run, first) in scores.chunks(RUN).zip((start..).step_by(RUN)) {
+        if run.iter().fold(true, |all, &score| all & dropped(score, cutoff)) {
+            continue;
+        }
+        for (&score, index) in run.iter().zip(first..) {
+            if !dropped(score, cutoff) {
+                let (lower, upper) = (margin.lower(score), margin.upper(score));
+                list.offer(Candidate { lower, upper, index });
             }
-            list.prune(|index| key(rows, batch, query, index, row))
-        })
+        }
     }
 }
 

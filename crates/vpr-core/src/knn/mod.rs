@@ -1,5 +1,7 @@
 //! Exact nearest neighbours over rows in memory or on disk, and smaller rows that lead to them.
 
+#[cfg(feature = "approximate")]
+mod approximate;
 mod block;
 mod compact;
 mod encoding;
@@ -13,6 +15,8 @@ mod selected;
 mod shortlist;
 mod single;
 
+#[cfg(feature = "approximate")]
+pub use approximate::{Hnsw, HnswCodes, HnswParams, MeasuredRecall};
 pub use compact::{F16Rows, Int8Rows, SignRows};
 pub use encoding::{Int8Row, decode_f16, decode_int8, encode_f16, encode_int8};
 pub use exact::{SearchParams, search};

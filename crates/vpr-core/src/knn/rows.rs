@@ -31,6 +31,15 @@ pub trait RowSource: Sync {
     /// If the range reaches beyond [`Self::len`].
     fn block<'a>(&'a self, rows: Range<usize>, scratch: &'a mut Vec<f32>) -> Result<&'a [f32]>;
 
+    /// Where a piece that starts at row `start` best ends if about `wanted` rows are needed.
+    ///
+    /// A source whose rows are read or checked many at a time says so here, so that a search that
+    /// takes all of them gets there by reading each of them once. Changes the time, not the result;
+    /// above `start`, at most [`Self::len`].
+    fn piece_end(&self, start: usize, wanted: usize) -> usize {
+        start.saturating_add(wanted.max(1)).min(self.len())
+    }
+
     /// Whether there is no row.
     fn is_empty(&self) -> bool {
         self.len() == 0

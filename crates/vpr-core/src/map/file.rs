@@ -16,7 +16,9 @@ use super::{
     layout::{self, Rows},
     touch::{Touched, check_digest, check_finite},
 };
-use crate::{Descriptors, Error, Result, knn::RowSource};
+use crate::{Descriptors, Error, Result};
+
+mod row_source;
 
 /// How the descriptors of an open map are reached.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -202,7 +204,6 @@ impl MapFile {
         let dim = self.rows.dim;
         assert!(values.len().is_multiple_of(dim), "whole rows are read");
         let rows = self.check_range(start..start + values.len() / dim)?;
-        self.touch(&rows)?;
         let scales = self.scales()?;
         let scale = |row: usize| scales.get(row).copied().unwrap_or(1.0);
         let row_bytes = self.rows.row_bytes();
@@ -212,12 +213,18 @@ impl MapFile {
                 self.rows.row_type.decode(bytes, scale(row), values);
             }
         };
-        if let Some(bytes) = self.mapped(&self.rows.bytes_of(&rows)) {
+        let range = self.rows.bytes_of(&rows);
+        if let Some(bytes) = self.mapped(&range) {
+            self.touch(&rows)?;
             decode(bytes, values);
         } else if self.rows.row_type == RowType::F32 && cfg!(target_endian = "little") {
-            self.read_at(bytemuck::cast_slice_mut(values), self.rows.bytes_of(&rows).start)?;
+            let bytes = bytemuck::cast_slice_mut(values);
+            self.read_at(bytes, range.start)?;
+            self.touch_read(&rows, bytes)?;
         } else {
-            decode(&self.read_bytes(&self.rows.bytes_of(&rows))?, values);
+            let bytes = self.read_bytes(&range)?;
+            self.touch_read(&rows, &bytes)?;
+            decode(&bytes, values);
         }
         Ok(())
     }
@@ -286,13 +293,29 @@ impl MapFile {
         self.touched.check(self.rows.blocks_of(rows), |block| self.check_block(block))
     }
 
+    /// Like [`Self::touch`], with the bytes of these rows at hand: a block that lies in them as a
+    /// whole is not read again.
+    fn touch_read(&self, rows: &Range<usize>, bytes: &[u8]) -> Result<()> {
+        let row_bytes = self.rows.row_bytes();
+        self.touched.check(self.rows.blocks_of(rows), |block| {
+            let range = self.rows.block(block);
+            if range.start < rows.start || range.end > rows.end {
+                return self.check_block(block);
+            }
+            let at = |row: usize| (row - rows.start) * row_bytes;
+            self.check_bytes(block, &bytes[at(range.start)..at(range.end)])
+        })
+    }
+
     /// Checks digest and finiteness of one block of descriptors.
     fn check_block(&self, block: usize) -> Result<()> {
+        self.with_bytes(&self.rows.block(block), |bytes| self.check_bytes(block, bytes))
+    }
+
+    fn check_bytes(&self, block: usize, bytes: &[u8]) -> Result<()> {
         let range = self.rows.block(block);
-        self.with_bytes(&range, |bytes| {
-            check_digest(&self.path, &range, bytes, self.stored_digest(block))?;
-            check_finite(&self.path, &self.rows, &range, bytes)
-        })
+        check_digest(&self.path, &range, bytes, self.stored_digest(block))?;
+        check_finite(&self.path, &self.rows, &range, bytes)
     }
 
     /// Checks the digest of one block of descriptors.
@@ -368,25 +391,6 @@ impl MapFile {
             return Err(Error::format(&self.path, format!("scales, row {row}"), reason));
         }
         Ok(self.scales.get_or_init(|| scales))
-    }
-}
-
-impl RowSource for MapFile {
-    fn len(&self) -> usize {
-        self.rows.len
-    }
-
-    fn dim(&self) -> usize {
-        self.rows.dim
-    }
-
-    fn block<'a>(&'a self, rows: Range<usize>, scratch: &'a mut Vec<f32>) -> Result<&'a [f32]> {
-        if let Some(values) = self.rows_in_place(rows.clone())? {
-            return Ok(values);
-        }
-        scratch.resize(rows.len() * self.rows.dim, 0.0);
-        self.read_rows(rows.start, scratch)?;
-        Ok(scratch)
     }
 }
 

@@ -7,6 +7,7 @@ use ndarray::array;
 use super::*;
 use crate::{
     PlanarPosition, Pose, Poses,
+    knn::{RowSource as _, SearchParams, search},
     map::{MapWriter, Names},
 };
 
@@ -65,6 +66,49 @@ fn damage_is_found_when_it_is_touched_unless_trusted() {
     assert!(err.contains("descriptors, rows 0..100: the bytes do not have the digest"), "{err}");
     let opening = Opening { trust: true, ..Opening::default() };
     MapFile::open_with(&path, opening).unwrap().descriptors().unwrap();
+}
+
+/// Ten rows of 256 KiB: a block with a digest has four.
+fn write_wide(path: &Path) -> Descriptors {
+    let value = |(row, column): (usize, usize)| ((row * 7 + column * 3) % 101) as f32;
+    let rows = Array2::from_shape_fn((10, 65_536), value);
+    let mut writer = MapWriter::create(path, 65_536, RowType::F32, About::default()).unwrap();
+    writer.append(rows.view(), None, None).unwrap();
+    writer.finish().unwrap();
+    Descriptors::new(rows).unwrap()
+}
+
+#[test]
+fn a_block_is_read_as_a_whole_until_it_has_been_checked() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.safetensors");
+    let rows = write_wide(&path);
+    let params = SearchParams { k: 10, block_rows: Some(3), ..SearchParams::default() };
+    let expected = search(&rows, &rows, &params).unwrap();
+    for access in [Access::Mapped, Access::Read] {
+        let file = MapFile::open_with(&path, Opening { access, trust: false }).unwrap();
+        assert_eq!([0, 5, 8].map(|start| file.piece_end(start, 1)), [4, 8, 10]);
+        assert_eq!(search(&file, &rows, &params).unwrap(), expected);
+        assert_eq!([0, 5, 8].map(|start| file.piece_end(start, 3)), [3, 8, 10]);
+        let trusted = MapFile::open_with(&path, Opening { access, trust: true }).unwrap();
+        assert_eq!(trusted.piece_end(5, 1), 6);
+        assert_eq!(search(&trusted, &rows, &params).unwrap(), expected);
+    }
+}
+
+#[test]
+fn a_search_finds_damage_in_any_block_it_reads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.safetensors");
+    let rows = write_wide(&path);
+    let mut bytes = fs::read(&path).unwrap();
+    bytes[layout::ALIGNMENT + 5 * 262_144 + 3] ^= 1;
+    fs::write(&path, &bytes).unwrap();
+    for access in [Access::Mapped, Access::Read] {
+        let file = MapFile::open_with(&path, Opening { access, trust: false }).unwrap();
+        let err = search(&file, &rows, &SearchParams::default()).unwrap_err().to_string();
+        assert!(err.contains("descriptors, rows 4..8: the bytes do not have"), "{err}");
+    }
 }
 
 #[test]

@@ -60,6 +60,16 @@ impl OpenMap {
         &self.about
     }
 
+    /// Digest of everything in the map: another map has another one.
+    #[must_use]
+    pub fn digest(&self) -> String {
+        let headers = self.segments.iter().filter_map(|file| {
+            // The header has the digest of the table of digests, so it stands for all bytes.
+            file.header().metadata.get(super::layout::HEADER_DIGEST).map(String::as_str)
+        });
+        super::BlockDigest::of(headers.collect::<Vec<_>>().join("\n").as_bytes()).to_hex()
+    }
+
     /// The files it consists of.
     #[must_use]
     pub fn segments(&self) -> &[MapFile] {
@@ -190,6 +200,15 @@ impl RowSource for OpenMap {
         self.dim()
     }
 
+    /// Within one segment, where that wants it.
+    fn piece_end(&self, start: usize, wanted: usize) -> usize {
+        if start >= self.len() {
+            return self.len();
+        }
+        let (segment, row) = self.segment_of(start);
+        self.starts[segment] + self.segments[segment].piece_end(row, wanted)
+    }
+
     fn block<'a>(&'a self, rows: Range<usize>, scratch: &'a mut Vec<f32>) -> Result<&'a [f32]> {
         if rows.is_empty() {
             return Ok(&[]);
@@ -237,6 +256,9 @@ mod tests {
         grow(folder.path(), RowType::F32, 5, 100);
         let map = OpenMap::open(folder.path(), Opening::default()).unwrap();
         assert_eq!((before.len(), map.len()), (4, 9), "an open map keeps its view");
+        assert_ne!(before.digest(), map.digest());
+        let pieces = [0, 3, 4, 8].map(|start| map.piece_end(start, 1));
+        assert_eq!(pieces, [4, 4, 9, 9], "unchecked blocks end with their segments");
         let all = ndarray::concatenate![ndarray::Axis(0), rows(4, 0), rows(5, 100)];
         let mut scratch = Vec::new();
         let across = map.block(2..7, &mut scratch).unwrap();

@@ -24,6 +24,11 @@ impl Touched {
         Self(Some((0..n_blocks).map(|_| AtomicBool::new(false)).collect()))
     }
 
+    /// Whether a block counts as checked.
+    pub(super) fn has(&self, block: usize) -> bool {
+        self.0.as_ref().is_none_or(|checked| checked[block].load(Ordering::Relaxed))
+    }
+
     /// Checks those of the blocks that have not been checked before.
     pub(super) fn check(
         &self,
@@ -32,7 +37,7 @@ impl Touched {
     ) -> Result<()> {
         let Some(checked) = &self.0 else { return Ok(()) };
         for block in blocks {
-            if !checked[block].load(Ordering::Relaxed) {
+            if !self.has(block) {
                 check(block)?;
                 checked[block].store(true, Ordering::Relaxed);
             }

@@ -1,10 +1,21 @@
 //! The parsers, how each is called, and the sound files that damage starts from.
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use ndarray::Array2;
 use vpr_core::{
     Descriptors, Error, PlanarPosition, Pose, Poses,
+    dataset::{
+        layout::{
+            pose_csv::PoseTable,
+            vpr_bench::{GroundTruthFile, PublishedMatches, read_areas, read_curves},
+        },
+        manifest::Manifest,
+    },
+    knn::{Pca, PcaParams},
     map::{
         About, Coordinates, GrowingMap, RowType, UtmZone,
         door::{self, Format, PairList, Pairs, Parts},
@@ -32,6 +43,18 @@ macro_rules! file_target {
             name: $name,
             file: $file,
             read: |folder| door::problems($format, &folder.join($file)),
+            notices_all: false,
+        }
+    };
+}
+
+/// A target that reads the file `file` by one function.
+macro_rules! read_target {
+    ($name:literal, $file:literal, $read:expr) => {
+        Target {
+            name: $name,
+            file: $file,
+            read: |folder| ($read)(&folder.join($file)).err().into_iter().collect(),
             notices_all: false,
         }
     };
@@ -88,6 +111,16 @@ pub(crate) const TARGETS: &[Target] = &[
         read: |folder| door::read_pairs(Format::VprEval, folder).err().into_iter().collect(),
         notices_all: false,
     },
+    file_target!("npy", "a.npy", Format::Npy),
+    read_target!("pca", "a.json", Pca::open),
+    read_target!("dataset-manifest", "a.toml", Manifest::read),
+    read_target!("pose-table", "a.csv", PoseTable::read),
+    read_target!("vpr-bench-matches", "a.npy", PublishedMatches::read),
+    read_target!("vpr-bench-truth", "a.npy", |path: &Path| {
+        GroundTruthFile::read(path)?.truth(10)
+    }),
+    read_target!("vpr-bench-curves", "a.pickle", read_curves),
+    read_target!("vpr-bench-areas", "a.pickle", read_areas),
     Target {
         name: "npy-objects",
         file: "a.npy",
@@ -117,6 +150,15 @@ fn parts(n: usize) -> Parts {
     }
 }
 
+/// A small projection, saved in this folder.
+fn pca(folder: &Path) -> PathBuf {
+    let params = PcaParams { n_components: 2, whiten: true };
+    let rows = Array2::from_shape_fn((9, 3), |(row, column)| ((row * 7 + column * 3) % 5) as f32);
+    let path = folder.join("pca");
+    Pca::fit(&Descriptors::new(rows).unwrap(), &params).unwrap().save(&path).unwrap();
+    path
+}
+
 /// Writes one sound file of every format, and keeps what is there already.
 pub(crate) fn write_seeds(corpus: &Path) {
     let folder = tempfile::tempdir().unwrap();
@@ -134,6 +176,8 @@ pub(crate) fn write_seeds(corpus: &Path) {
         ("tum", Format::Tum, None),
         ("kitti", Format::Kitti, None),
         ("csv", Format::PoseCsv, None),
+        ("pose-table", Format::PoseCsv, None),
+        ("npy", Format::Npy, None),
         ("map", Format::Map, Some(RowType::I8)),
         ("map", Format::Map, Some(RowType::F16)),
     ] {
@@ -145,6 +189,7 @@ pub(crate) fn write_seeds(corpus: &Path) {
         }
         seed(target, &name, &path);
     }
+    seed("pca", "sound", &pca(folder.path()));
     let place = |name: &str| folder.path().join(name);
     door::write(Format::SevenScenes, &place("scene"), &parts(1)).unwrap();
     seed("7scenes", "sound", &place("scene/frame-000000.pose.txt"));

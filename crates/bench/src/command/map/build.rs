@@ -35,6 +35,10 @@ pub(super) struct BuildArgs {
     /// Add a segment to the growing map in the folder OUT
     #[arg(long)]
     append: bool,
+    /// Also build a graph beside the map, for `search --approximate`
+    #[cfg(feature = "approximate")]
+    #[arg(long)]
+    approximate: bool,
     /// Name of the encoder
     #[arg(long)]
     encoder: Option<String>,
@@ -83,6 +87,10 @@ pub(super) fn run(args: &BuildArgs) -> anyhow::Result<Outcome> {
     } else {
         parts.write_map(&args.out, args.row_type)?;
         cli::note(&format!("wrote {n_rows} references"));
+    }
+    #[cfg(feature = "approximate")]
+    if args.approximate {
+        super::approximate::build(&args.out)?;
     }
     Ok(Outcome::Success)
 }

@@ -1,5 +1,7 @@
 //! `bench map`: reference maps on disk, in and out of other programs' formats.
 
+#[cfg(feature = "approximate")]
+mod approximate;
 mod build;
 mod convert;
 mod info;

@@ -34,6 +34,11 @@ pub(super) struct SearchArgs {
     /// Search only references at most RADIUS metres from X,Y (and height zero, or Z)
     #[arg(long, value_name = "X,Y[,Z],RADIUS", allow_hyphen_values = true)]
     near: Option<Near>,
+    /// Search the graph that `build --approximate` left beside the map: faster, and a neighbour may
+    /// be missing; distances are exact
+    #[cfg(feature = "approximate")]
+    #[arg(long, conflicts_with = "near")]
+    approximate: bool,
     /// Do not check digests and finiteness of the blocks that are read
     #[arg(long)]
     trust: bool,
@@ -78,6 +83,10 @@ pub(super) fn run(args: &SearchArgs) -> anyhow::Result<Outcome> {
     let metric = args.metric.or(map.about().metric).unwrap_or_default();
     let params = SearchParams { metric, k: args.k, ..SearchParams::default() };
     let retrieval = match &args.near {
+        #[cfg(feature = "approximate")]
+        None if args.approximate => {
+            super::approximate::search(&args.map, &map, &descriptors, &params)?
+        }
         None => knn::search(&map, &descriptors, &params)?,
         Some(near) => {
             let no_poses = || Error::Empty("poses").in_file(&args.map);
