@@ -27,6 +27,8 @@ enum Command {
     List(command::list::ListArgs),
     /// Make, convert, check and search reference maps on disk
     Map(command::map::MapArgs),
+    /// Match two images by local features: keypoints, matches, inliers, a picture
+    Match(Box<command::match_images::MatchArgs>),
     /// Say which networks there are and where their weights are from
     Methods(command::methods::MethodsArgs),
     /// Say everything that is wrong with a dataset folder
@@ -40,6 +42,7 @@ fn main() -> ExitCode {
         Command::Encode(args) => command::encode::run(&args),
         Command::List(args) => command::list::run(&args),
         Command::Map(args) => command::map::run(&args),
+        Command::Match(args) => command::match_images::run(&args),
         Command::Methods(args) => command::methods::run(&args),
         Command::Validate(args) => command::validate::run(&args),
     })

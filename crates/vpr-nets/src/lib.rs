@@ -15,11 +15,17 @@ pub mod aggregate;
 pub mod backbone;
 pub mod encode;
 mod error;
+mod fused;
+mod infer;
 pub mod layer;
 pub mod local;
 pub mod loss;
 pub mod model;
+pub mod normalize;
+mod plain;
+pub mod regress;
 pub mod train;
+pub mod transformer;
 pub mod weights;
 
 pub use error::{Error, Mismatch, Result};

@@ -4,21 +4,22 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use bench::{study::Observer, technique::HandCrafted};
-use clap::ValueEnum;
 use vpr_core::{
     Descriptors, GroundTruth, Poses, Ranking,
-    cli::{self, Outcome},
+    cli::{self, DataArgs, Outcome},
     dataset::layout::{
         pose_csv::PoseTable,
         utm_names::UtmFolder,
         vpr_bench::{GroundTruthFile, image_folder},
     },
-    metrics::recall_at,
+    metrics::{Positives, auc_pr, recall_at},
     npy, retrieve,
 };
+use vpr_nets::encode::encode_files;
 use vpr_vision::{cohog::CoHogParams, hog::HogParams};
 
 use super::{
+    encoder::EncoderArgs,
     predictions::{self, Named},
     run::Bar,
 };
@@ -32,9 +33,13 @@ pub(crate) struct EvaluateArgs {
     /// Folder of the query images
     #[arg(long, alias = "queries_folder", value_name = "DIR", requires = "database_folder")]
     pub(super) queries_folder: Option<PathBuf>,
-    /// Technique that describes the images
-    #[arg(long, value_enum, default_value_t = Method::Hog)]
-    method: Method,
+    /// Technique that describes the images: hog, hog-thesis, cohog, or a network of `bench methods`
+    #[arg(long, default_value = "hog", value_name = "NAME")]
+    method: String,
+    #[command(flatten)]
+    encoder: EncoderArgs,
+    #[command(flatten)]
+    data: DataArgs,
     /// Descriptors of the references, one row each: .npy, float32
     #[arg(
         long,
@@ -67,6 +72,9 @@ pub(crate) struct EvaluateArgs {
     /// Which N of recall@N to print
     #[arg(long, alias = "recall_values", num_args = 1.., default_values_t = [1, 5, 10, 20], value_name = "N")]
     recall_values: Vec<usize>,
+    /// Print the area under the precision-recall curve of the best matches too
+    #[arg(long, alias = "auc_pr", conflicts_with = "no_labels")]
+    auc_pr: bool,
     /// Only retrieve; positions are unknown
     #[arg(long, alias = "no_labels")]
     pub(super) no_labels: bool,
@@ -87,24 +95,13 @@ pub(crate) struct EvaluateArgs {
     num_workers: Option<usize>,
 }
 
-/// A technique that runs here.
-#[derive(Clone, Copy, ValueEnum)]
-enum Method {
-    /// HOG in VPR-Bench's released configuration, 35721 dimensions
-    Hog,
-    /// HOG in the thesis' configuration, 34596 dimensions
-    HogThesis,
-    /// CoHOG, 961 regions of 32 dimensions
-    Cohog,
-}
-
-impl Method {
-    fn technique(self) -> HandCrafted {
-        match self {
-            Self::Hog => HandCrafted::Hog(HogParams::RELEASED),
-            Self::HogThesis => HandCrafted::Hog(HogParams::THESIS),
-            Self::Cohog => HandCrafted::CoHog(CoHogParams::default()),
-        }
+/// The hand-crafted technique of this name; all others are networks.
+fn hand_crafted(method: &str) -> Option<HandCrafted> {
+    match method {
+        "hog" => Some(HandCrafted::Hog(HogParams::RELEASED)),
+        "hog-thesis" => Some(HandCrafted::Hog(HogParams::THESIS)),
+        "cohog" => Some(HandCrafted::CoHog(CoHogParams::default())),
+        _ => None,
     }
 }
 
@@ -113,6 +110,8 @@ pub(super) struct Retrieved {
     pub(super) queries: Named,
     pub(super) references: Named,
     pub(super) ranking: Ranking,
+    /// How sure the best match of each query is; higher is surer.
+    confidence: Vec<f64>,
     /// Query and reference vectors, for techniques that have one per image.
     pub(super) descriptors: Option<(Descriptors, Descriptors)>,
 }
@@ -136,9 +135,23 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         });
         let entries: Vec<String> = entries.collect::<vpr_core::Result<_>>()?;
         cli::print(&format!("{}\n", entries.join(", ")))?;
+        if args.auc_pr {
+            print_auc_pr(&retrieved, truth)?;
+        }
     }
     predictions::save(args, &retrieved, truth.as_ref())?;
     Ok(Outcome::Success)
+}
+
+/// Prints AUC-PR in both definitions.
+fn print_auc_pr(retrieved: &Retrieved, truth: &GroundTruth) -> anyhow::Result<()> {
+    let ranking = &retrieved.ranking;
+    let best: Vec<_> = (0..ranking.len()).map(|query| ranking.indices(query)[0]).collect();
+    let correct = truth.judge(&best)?;
+    let area = |positives| auc_pr(&retrieved.confidence, &correct, positives);
+    let (published, corrected) = (area(Positives::Published)?, area(Positives::corrected(truth))?);
+    cli::print(&format!("AUC-PR: {published:.3} (published), {corrected:.3} (corrected)\n"))?;
+    Ok(())
 }
 
 /// Describes and matches the images of two folders.
@@ -151,7 +164,9 @@ fn from_folders(
     let needs_positions = !args.no_labels && args.ground_truth.is_none();
     let queries = Named::folder(queries, needs_positions)?;
     let references = Named::folder(references, needs_positions)?;
-    let technique = args.method.technique();
+    let Some(technique) = hand_crafted(&args.method) else {
+        return by_network(args, queries, references, k);
+    };
     let bar = Bar::default();
     let n = queries.names.len() + references.names.len();
     bar.start("images", n);
@@ -162,7 +177,51 @@ fn from_folders(
     let matched = query_features.match_with(&reference_features)?;
     let ranking = matched.similarities.ranked(k)?;
     let descriptors = query_features.into_descriptors().zip(reference_features.into_descriptors());
-    Ok(Retrieved { queries, references, ranking, descriptors })
+    let confidence = matched.similarities.best().confidence;
+    Ok(Retrieved { queries, references, ranking, confidence, descriptors })
+}
+
+/// Describes the images of two folders by a network and retrieves by Euclidean distance.
+fn by_network(
+    args: &EvaluateArgs,
+    queries: Named,
+    references: Named,
+    k: usize,
+) -> anyhow::Result<Retrieved> {
+    let encoder = args.encoder.open(&args.method, &args.data.data)?;
+    let options = args.encoder.options(args.num_workers, false);
+    if encoder.batch_dependent() && options.batch_size > 1 {
+        cli::note(&format!(
+            "warning: descriptors of `{}` depend on their batch; `--batch-size 1` gives those of single images",
+            encoder.name()
+        ));
+    }
+    let bar = cli::progress(encoder.name(), queries.names.len() + references.names.len());
+    let encode = |paths: &[PathBuf], before: usize| {
+        encode_files(&*encoder, paths, &options, &mut |done| {
+            bar.set_position((before + done) as u64)
+        })
+    };
+    let query_rows = encode(&queries.names, 0)?;
+    let reference_rows = encode(&references.names, queries.names.len())?;
+    bar.finish_and_clear();
+    nearest(queries, references, query_rows, reference_rows, k)
+}
+
+/// The nearest references by Euclidean distance.
+fn nearest(
+    queries: Named,
+    references: Named,
+    query_rows: Descriptors,
+    reference_rows: Descriptors,
+    k: usize,
+) -> anyhow::Result<Retrieved> {
+    let retrieval = retrieve(&query_rows, &reference_rows, k)?;
+    let confidence =
+        (0..retrieval.len()).map(|query| -f64::from(retrieval.distances(query)[0])).collect();
+    let ranking = AsRef::<Ranking>::as_ref(&retrieval).clone();
+    let descriptors = Some((query_rows, reference_rows));
+    Ok(Retrieved { queries, references, ranking, confidence, descriptors })
 }
 
 /// Retrieves from two files of descriptors by Euclidean distance.
@@ -177,18 +236,14 @@ fn from_descriptors(args: &EvaluateArgs, k: usize) -> anyhow::Result<Retrieved> 
         Descriptors::new(npy::read_f32(path)?).with_context(|| path.display().to_string())
     };
     let (query_rows, reference_rows) = (read(queries)?, read(references)?);
-    let retrieval = retrieve(&query_rows, &reference_rows, k)
-        .with_context(|| format!("{} and {}", queries.display(), references.display()))?;
     let named = |poses: &Option<PathBuf>, rows: &Descriptors| match poses {
         Some(path) => Named::poses(path, rows.len()),
         None => Ok(Named::numbered(rows.len())),
     };
-    Ok(Retrieved {
-        queries: named(&args.queries_poses, &query_rows)?,
-        references: named(&args.database_poses, &reference_rows)?,
-        ranking: AsRef::<Ranking>::as_ref(&retrieval).clone(),
-        descriptors: Some((query_rows, reference_rows)),
-    })
+    let (named_queries, named_references) =
+        (named(&args.queries_poses, &query_rows)?, named(&args.database_poses, &reference_rows)?);
+    nearest(named_queries, named_references, query_rows, reference_rows, k)
+        .with_context(|| format!("{} and {}", queries.display(), references.display()))
 }
 
 /// Which references are correct: from a file, or by distance.

@@ -5,6 +5,7 @@ mod encoder;
 pub(crate) mod evaluate;
 pub(crate) mod list;
 pub(crate) mod map;
+pub(crate) mod match_images;
 pub(crate) mod methods;
 pub(crate) mod predictions;
 pub(crate) mod run;

@@ -15,6 +15,7 @@ mod spacing;
 mod subject;
 mod swap;
 mod tolerances;
+mod verification;
 
 use serde::Deserialize;
 use vpr_core::{
@@ -118,6 +119,15 @@ pub enum Study {
         /// Datasets with image series.
         series: Vec<String>,
     },
+    /// Inliers of near and far pairs of images: verification.
+    Verification {
+        /// A scene of 7-Scenes, by id.
+        dataset: String,
+        /// Which pairs.
+        pairs: verification::Pairs,
+        /// Local features and how they are matched.
+        methods: Vec<verification::LocalMethod>,
+    },
 }
 
 /// What a study made: numbers, and a drawing of them if it is a figure.
@@ -218,6 +228,9 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         }
         Study::Invariance { stored, series } => {
             invariance::run(&mut table, stored, series, context)?
+        }
+        Study::Verification { dataset, pairs, methods } => {
+            verification::run(&mut table, dataset, *pairs, methods, context)?
         }
     };
     experiment.fill_thesis(&mut table);

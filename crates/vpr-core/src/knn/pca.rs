@@ -83,6 +83,18 @@ impl Pca {
         self.variances.len()
     }
 
+    /// The mean that is subtracted, one value per dimension.
+    #[must_use]
+    pub fn mean(&self) -> &[f64] {
+        &self.mean
+    }
+
+    /// The components, `n_components × dim`, row by row; divided by the standard deviation if whitening.
+    #[must_use]
+    pub fn projection(&self) -> &[f64] {
+        &self.projection
+    }
+
     /// Variance along every component before whitening, descending.
     #[must_use]
     pub fn variances(&self) -> &[f64] {

@@ -18,6 +18,15 @@ pub trait Encoder: Send + Sync {
     /// Descriptors, `n × dimension`, of images, `n × channels × height × width`, preprocessed.
     fn forward(&self, images: Tensor<4>) -> Tensor<2>;
 
+    /// Whether images of this size can be encoded.
+    ///
+    /// # Errors
+    ///
+    /// What the network needs, in words.
+    fn accepts(&self, _height: usize, _width: usize) -> Result<(), String> {
+        Ok(())
+    }
+
     /// Whether a descriptor depends on the other images of its batch, as `CricaVPR`'s does.
     fn batch_dependent(&self) -> bool {
         false

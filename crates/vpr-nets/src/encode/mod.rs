@@ -6,6 +6,7 @@
 
 mod batches;
 mod encoder;
+mod netvlad_mobile;
 mod network;
 mod preprocessing;
 pub mod registry;

@@ -1,6 +1,9 @@
 //! Networks as encoders, by the names of the registry.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use burn::{
     store::ModuleSnapshot,
@@ -9,13 +12,17 @@ use burn::{
 
 use super::{
     Encoder, Preprocessing, Size,
+    netvlad_mobile::NetVladMobile,
     registry::{Architecture, Method},
 };
 use crate::{
     Result,
     backbone::{EfficientNetLite0Config, efficientnet_lite},
-    model::default::{DefaultEncoder, DefaultEncoderConfig},
-    weights::{Report, Weights},
+    model::{
+        self, Model,
+        default::{DefaultEncoder, DefaultEncoderConfig},
+    },
+    weights::Weights,
 };
 
 /// Which encoder is wanted; everything but the name may be left to the registry.
@@ -36,6 +43,7 @@ pub struct Request {
 }
 
 type Forward = Box<dyn Fn(Tensor<4>) -> Tensor<2> + Send + Sync>;
+type Accepts = Box<dyn Fn(usize, usize) -> Result<(), String> + Send + Sync>;
 
 /// A network with its preprocessing and the digest of its weights.
 pub struct Network {
@@ -46,6 +54,16 @@ pub struct Network {
     digest: Option<String>,
     device: Device,
     forward: Forward,
+    accepts: Accepts,
+}
+
+/// A network with its weights, before it has a name.
+struct Ready {
+    /// What its weights say of its dimension; `None` if they fit one only.
+    dimension: Option<usize>,
+    digest: String,
+    forward: Forward,
+    accepts: Accepts,
 }
 
 impl Encoder for Network {
@@ -63,6 +81,10 @@ impl Encoder for Network {
 
     fn forward(&self, images: Tensor<4>) -> Tensor<2> {
         (self.forward)(images)
+    }
+
+    fn accepts(&self, height: usize, width: usize) -> Result<(), String> {
+        (self.accepts)(height, width)
     }
 
     fn batch_dependent(&self) -> bool {
@@ -104,24 +126,39 @@ pub fn by_request(request: &Request) -> Result<Box<dyn Encoder>> {
     let path = method.weights(request.weights.as_deref(), dimension, &request.roots)?;
     let weights = Weights::open(&path)?;
     let device = Device::flex();
-    let (forward, report) = match method.architecture {
+    let mut preprocessing = method.preprocessing();
+    preprocessing.size = request.size.unwrap_or(preprocessing.size);
+    let network = match method.architecture {
         Architecture::Default => {
             let network = DefaultEncoderConfig::new().init(&device);
             assembled(network, weights, &[], DefaultEncoder::forward)?
         }
+        Architecture::NetVladMobileNetV2 => {
+            let network = NetVladMobile::new(preprocessing.n_channels(), &device);
+            let weights = NetVladMobile::keys(weights)?;
+            assembled(network, weights, &[], NetVladMobile::forward)?
+        }
         Architecture::EfficientNetLite0 => efficientnet_lite0(weights, &device)?,
-        _ => return Err(crate::Error::format(path, "architecture", "is not built yet")),
+        Architecture::BoqDinov2 => published(model::boq_dinov2(weights, &device)?),
+        Architecture::BoqResnet50 => published(model::boq_resnet50(weights, &device)?),
+        Architecture::Salad => published(model::salad(weights, &device)?),
+        Architecture::MixVpr => published(model::mixvpr(weights, &device)?),
+        Architecture::CosPlace | Architecture::EigenPlaces => {
+            published(model::cosplace(weights, &device)?)
+        }
+        Architecture::NetVlad => published(model::netvlad(weights, &device)?),
+        Architecture::CricaVpr => published(model::cricavpr(weights, &device)?),
+        Architecture::GemResNet50 => published(model::gem_resnet50(weights, &device)?),
     };
-    let mut preprocessing = method.preprocessing();
-    preprocessing.size = request.size.unwrap_or(preprocessing.size);
     Ok(Box::new(Network {
         name: method.name.clone(),
-        dimension,
+        dimension: network.dimension.unwrap_or(dimension),
         preprocessing,
         batch_dependent: method.architecture == Architecture::CricaVpr,
-        digest: Some(format!("sha256:{}", report.digest)),
+        digest: Some(format!("sha256:{}", network.digest)),
         device,
-        forward,
+        forward: network.forward,
+        accepts: network.accepts,
     }))
 }
 
@@ -131,15 +168,32 @@ fn assembled<M>(
     weights: Weights,
     renames: &[(&str, &str)],
     forward: impl Fn(&M, Tensor<4>) -> Tensor<2> + Send + Sync + 'static,
-) -> Result<(Forward, Report)>
+) -> Result<Ready>
 where
     M: ModuleSnapshot + Send + Sync + 'static,
 {
     let report = weights.renamed(renames)?.apply(&mut module)?;
-    Ok((Box::new(move |images| forward(&module, images)), report))
+    Ok(Ready {
+        dimension: None,
+        digest: report.digest,
+        forward: Box::new(move |images| forward(&module, images)),
+        accepts: Box::new(|_, _| Ok(())),
+    })
 }
 
-fn efficientnet_lite0(weights: Weights, device: &Device) -> Result<(Forward, Report)> {
+/// A published network, whose sizes are those of its weights.
+fn published(model: impl Model + 'static) -> Ready {
+    let model = Arc::new(model);
+    let accepting = Arc::clone(&model);
+    Ready {
+        dimension: Some(model.dimension()),
+        digest: model.report().digest.clone(),
+        forward: Box::new(move |images| model.describe(images)),
+        accepts: Box::new(move |height, width| accepting.accepts(height, width)),
+    }
+}
+
+fn efficientnet_lite0(weights: Weights, device: &Device) -> Result<Ready> {
     let network = EfficientNetLite0Config::new().init(device);
     let renames = [&[(r"^_fc\..*", "")][..], &efficientnet_lite::RENAMES].concat();
     assembled(network, weights, &renames, |network, images| {

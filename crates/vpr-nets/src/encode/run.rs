@@ -231,6 +231,10 @@ fn encode_batch(
         let rows = Array2::zeros((0, dimension));
         return Ok(Encoded { images, kept, rows, skipped });
     };
+    encoder.accepts(size.height, size.width).map_err(|reason| {
+        let value = format!("{}×{}", size.width, size.height);
+        crate::Error::format(encoder.name(), value, reason)
+    })?;
     let shape = [kept.len(), encoder.preprocessing().n_channels(), size.height, size.width];
     let tensor = Tensor::<4>::from_data(TensorData::new(values, shape), &encoder.device());
     let data = encoder.forward(tensor).into_data();

@@ -1,0 +1,234 @@
+//! `bench match`: keypoints, matches and inliers of two images.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::ValueEnum;
+use serde::Serialize;
+use vpr_core::cli::{self, DataArgs, Outcome};
+use vpr_nets::local;
+use vpr_vision::{
+    features::{Extractor, LocalFeatures},
+    image,
+    matching::{self, Match, MatchParams},
+    ransac::{self, Inliers, RansacParams},
+};
+
+/// Which images, how they are described, matched and verified.
+#[derive(clap::Args)]
+pub(crate) struct MatchArgs {
+    /// The query image
+    a: PathBuf,
+    /// The reference image
+    b: PathBuf,
+    /// Local features
+    #[arg(long, value_enum, default_value_t = Method::Sift)]
+    method: Method,
+    /// Weights of a network, .pt, .pth or .safetensors; by default DIR/weights/ of `--data`
+    #[arg(long, value_name = "FILE")]
+    weights: Option<PathBuf>,
+    /// Keypoints per image, the strongest
+    #[arg(long, default_value_t = 5000, value_name = "N")]
+    features: usize,
+    /// Lowe's ratio test; 0.6 for SIFT and ORB, none for networks
+    #[arg(long, value_name = "R", conflicts_with = "mutual")]
+    ratio: Option<f64>,
+    /// Mutual nearest neighbours without a ratio test; the default for networks
+    #[arg(long)]
+    mutual: bool,
+    /// What the inliers agree on
+    #[arg(long, value_enum, default_value_t = Geometry::Homography)]
+    geometry: Geometry,
+    /// Inliers are nearer than this, in pixels; 5 for a homography, 3 for a fundamental matrix
+    #[arg(long, value_name = "PX")]
+    threshold: Option<f64>,
+    /// Samples of RANSAC
+    #[arg(long, default_value_t = 1000, value_name = "N")]
+    iterations: u32,
+    /// Seed of the samples
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Draw the matches: inliers green, others red
+    #[arg(long, value_name = "PNG")]
+    plot: Option<PathBuf>,
+    /// What is printed: counts, all as JSON, or one line per match as CSV
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    format: Format,
+    #[command(flatten)]
+    data: DataArgs,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Method {
+    /// SIFT, as OpenCV's
+    Sift,
+    /// ORB, as ORB-SLAM3's
+    Orb,
+    /// `XFeat`, weights `xfeat.pt`
+    Xfeat,
+    /// DISK, weights `disk-depth-save.pth`
+    Disk,
+    /// `SuperPoint`, weights `superpoint_v6_from_tf.pth`
+    Superpoint,
+    /// DELF-style attentive features, weights `delf.pth`
+    Delf,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Geometry {
+    /// A plane or a turning camera
+    Homography,
+    /// The epipolar geometry of two views
+    Fundamental,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Format {
+    Text,
+    Json,
+    Csv,
+}
+
+impl Method {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Sift => "sift",
+            Self::Orb => "orb",
+            Self::Xfeat => "xfeat",
+            Self::Disk => "disk",
+            Self::Superpoint => "superpoint",
+            Self::Delf => "delf",
+        }
+    }
+
+    /// The file name of the published weights.
+    fn weights(self) -> Option<&'static str> {
+        match self {
+            Self::Sift | Self::Orb => None,
+            Self::Xfeat => Some("xfeat.pt"),
+            Self::Disk => Some("disk-depth-save.pth"),
+            Self::Superpoint => Some("superpoint_v6_from_tf.pth"),
+            Self::Delf => Some("delf.pth"),
+        }
+    }
+}
+
+pub(crate) fn run(args: &MatchArgs) -> anyhow::Result<Outcome> {
+    let method = extractor(args)?;
+    let [a, b] = [&args.a, &args.b].map(|path| image::decode(path));
+    let images = [a?, b?];
+    let [a, b] = [(&images[0], &args.a), (&images[1], &args.b)]
+        .map(|(image, path)| method.extract(image).with_context(|| path.display().to_string()));
+    let features = [a?, b?];
+    let matches = matching::match_features(&features[0], &features[1], &matching_params(args))?;
+    let inliers = verify(args, &features, &matches)?;
+    if let Some(path) = &args.plot {
+        let [a, b] = &images;
+        let picture =
+            matching::draw([a, b], [&features[0], &features[1]], &matches, &inliers.mask)?;
+        image::write_png(&picture, path)?;
+    }
+    let text = match args.format {
+        Format::Text => format!(
+            "keypoints  {} {}\nmatches    {}\ninliers    {}\n",
+            features[0].len(),
+            features[1].len(),
+            matches.len(),
+            inliers.count()
+        ),
+        Format::Json => json(method.name(), &features, &matches, &inliers)?,
+        Format::Csv => csv(&features, &matches, &inliers),
+    };
+    cli::print(&text)?;
+    Ok(Outcome::Success)
+}
+
+fn extractor(args: &MatchArgs) -> anyhow::Result<Box<dyn Extractor>> {
+    let name = args.method.name();
+    let weights = match (args.method.weights(), &args.weights) {
+        (None, _) => None,
+        (Some(_), Some(path)) => Some(path.clone()),
+        (Some(file), None) => {
+            let path = args.data.data.join("weights").join(file);
+            let missing = || format!("{name} needs weights: give --weights FILE");
+            path.try_exists()
+                .ok()
+                .filter(|&it| it)
+                .with_context(|| format!("{}: not there; {}", path.display(), missing()))?;
+            Some(path)
+        }
+    };
+    Ok(local::by_name(name, weights.as_deref().map(Path::new), args.features)?)
+}
+
+fn matching_params(args: &MatchArgs) -> MatchParams {
+    let learned = args.method.weights().is_some();
+    match args.ratio {
+        Some(ratio) => MatchParams { ratio: Some(ratio), ..MatchParams::RATIO },
+        None if args.mutual || learned => MatchParams::MUTUAL,
+        None => MatchParams::RATIO,
+    }
+}
+
+fn verify(
+    args: &MatchArgs,
+    features: &[LocalFeatures; 2],
+    matches: &[Match],
+) -> vpr_core::Result<Inliers> {
+    let points = ransac::correspondences(&features[0], &features[1], matches);
+    let (iterations, seed) = (args.iterations, args.seed);
+    let params = |default: RansacParams| RansacParams {
+        threshold: args.threshold.unwrap_or(default.threshold),
+        iterations,
+        seed,
+        ..default
+    };
+    match args.geometry {
+        Geometry::Homography => ransac::homography(&points, &params(RansacParams::HOMOGRAPHY)),
+        Geometry::Fundamental => ransac::fundamental(&points, &params(RansacParams::EPIPOLAR)),
+    }
+}
+
+/// One match as it is printed.
+#[derive(Serialize)]
+struct Line {
+    a: [f32; 2],
+    b: [f32; 2],
+    distance: f32,
+    inlier: bool,
+}
+
+fn lines(features: &[LocalFeatures; 2], matches: &[Match], inliers: &Inliers) -> Vec<Line> {
+    let of = |(it, &inlier): (&Match, &bool)| Line {
+        a: features[0].keypoints()[it.query],
+        b: features[1].keypoints()[it.reference],
+        distance: it.distance,
+        inlier,
+    };
+    matches.iter().zip(&inliers.mask).map(of).collect()
+}
+
+fn json(
+    method: &str,
+    features: &[LocalFeatures; 2],
+    matches: &[Match],
+    inliers: &Inliers,
+) -> anyhow::Result<String> {
+    let value = serde_json::json!({
+        "method": method,
+        "keypoints": [features[0].len(), features[1].len()],
+        "matches": matches.len(),
+        "inliers": inliers.count(),
+        "model": inliers.model,
+        "pairs": lines(features, matches, inliers),
+    });
+    Ok(serde_json::to_string_pretty(&value)? + "\n")
+}
+
+fn csv(features: &[LocalFeatures; 2], matches: &[Match], inliers: &Inliers) -> String {
+    let mut text = "a_x,a_y,b_x,b_y,distance,inlier\n".to_owned();
+    for Line { a, b, distance, inlier } in lines(features, matches, inliers) {
+        text += &format!("{},{},{},{},{distance},{inlier}\n", a[0], a[1], b[0], b[1]);
+    }
+    text
+}

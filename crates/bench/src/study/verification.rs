@@ -1,0 +1,223 @@
+//! Geometric verification of near and far pairs of images: inlier counts and how well they tell the two apart.
+
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Deserialize;
+use vpr_core::{
+    Pose, Result,
+    dataset::layout::seven_scenes,
+    figure::Figure,
+    metrics::{
+        auc_roc,
+        bootstrap::{self, Resampling},
+    },
+    table::{Cell, Provenance, Table},
+};
+use vpr_nets::local;
+use vpr_vision::{
+    features::{Extractor, LocalFeatures},
+    image::{self, ImageSize, resize_bilinear},
+    matching::{MatchParams, match_features},
+    ransac::{RansacParams, correspondences, homography},
+};
+
+use super::Context;
+
+/// Which pairs are looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pairs {
+    /// Near and far pairs, so many of each.
+    pub n: usize,
+    /// Near pairs are closer than this, in metres, and turned by less, in degrees.
+    pub near: [f64; 2],
+    /// Far pairs are farther apart than this, in metres, or turned by more, in degrees.
+    pub far: [f64; 2],
+    /// Width that images are resized to; their own if larger.
+    pub width: usize,
+}
+
+/// Local features and the ways they are matched.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LocalMethod {
+    /// Name of the features.
+    pub features: String,
+    /// File below `weights/` of the data folder, if they need one.
+    pub weights: Option<PathBuf>,
+    /// Keypoints per image.
+    pub keypoints: usize,
+    /// Ways of matching, each a row of the table.
+    pub rows: Vec<Row>,
+}
+
+/// A row of the table: which neighbours are matches.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Row {
+    /// Its label.
+    pub name: String,
+    /// Lowe's ratio test, none if left out.
+    pub ratio: Option<f64>,
+    /// Whether each of the two must be the nearest of the other.
+    #[serde(default)]
+    pub mutual: bool,
+}
+
+impl Row {
+    fn matching(&self) -> MatchParams {
+        MatchParams { ratio: self.ratio, mutual: self.mutual, max_distance: None }
+    }
+}
+
+/// Two images, by index, and whether they are near.
+type Pair = ([usize; 2], bool);
+
+pub(super) fn run(
+    table: &mut Table,
+    dataset: &str,
+    pairs: Pairs,
+    methods: &[LocalMethod],
+    context: Context<'_>,
+) -> Result<Option<Figure>> {
+    let folder = context.data.find(&context.data.entry(dataset)?.path);
+    let found = folder.as_deref().map(|folder| open(folder, pairs, context.seed)).transpose()?;
+    for method in methods {
+        let mut absent = |why: &str| {
+            method.rows.iter().for_each(|row| table.push(Cell::absent(&row.name, COLUMN, why)));
+        };
+        let Some((images, found)) = &found else {
+            absent(&context.data.why_absent(dataset, "images")?);
+            continue;
+        };
+        let Some(extractor) = extractor(method, context)? else {
+            let file = method.weights.as_deref().unwrap_or(Path::new("")).display();
+            absent(&format!("weights/{file} is not at hand"));
+            continue;
+        };
+        let features = describe(&*extractor, images, found, pairs.width, context)?;
+        for row in &method.rows {
+            let counts = count(&features, found, row.matching())?;
+            report(table, &row.name, found, &counts, context.seed)?;
+        }
+    }
+    Ok(None)
+}
+
+const COLUMN: &str = "AUC-ROC";
+
+/// The images of a scene and the pairs drawn among them.
+fn open(folder: &Path, pairs: Pairs, seed: u64) -> Result<(Vec<PathBuf>, Vec<Pair>)> {
+    let (queries, references) = seven_scenes::open(folder)?;
+    let poses = [references.poses.six_dof()?, queries.poses.six_dof()?].concat();
+    Ok(([references.images, queries.images].concat(), sample(&poses, pairs, seed)))
+}
+
+fn extractor(method: &LocalMethod, context: Context<'_>) -> Result<Option<Box<dyn Extractor>>> {
+    let path = match &method.weights {
+        None => None,
+        Some(file) => match context.data.find(PathBuf::from("weights").join(file)) {
+            None => return Ok(None),
+            found => found,
+        },
+    };
+    let made = local::by_name(&method.features, path.as_deref(), method.keypoints);
+    made.map(Some).map_err(|error| match error {
+        vpr_nets::Error::Core(error) => error,
+        other => vpr_core::Error::format(path.unwrap_or_default(), "weights", other.to_string()),
+    })
+}
+
+/// The same number of near and far pairs, drawn by the seed; fewer if there are not so many.
+///
+/// Near pairs are drawn evenly over all there are, whatever their distance in time.
+fn sample(poses: &[Pose], pairs: Pairs, seed: u64) -> Vec<Pair> {
+    let (mut near, mut far) = (Vec::new(), Vec::new());
+    for first in 0..poses.len() {
+        for second in first + 1..poses.len() {
+            let between = poses[first].inv_mul(&poses[second]);
+            let apart = [between.translation.vector.norm(), between.rotation.angle().to_degrees()];
+            if apart[0] < pairs.near[0] && apart[1] < pairs.near[1] {
+                near.push(([first, second], true));
+            } else if apart[0] > pairs.far[0] || apart[1] > pairs.far[1] {
+                far.push(([first, second], false));
+            }
+        }
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let n = pairs.n.min(near.len()).min(far.len());
+    let mut draw = |mut from: Vec<Pair>| {
+        for at in 0..n {
+            let other = rng.random_range(at as u64..from.len() as u64);
+            from.swap(at, usize::try_from(other).expect("an index"));
+        }
+        from.truncate(n);
+        from
+    };
+    [draw(near), draw(far)].concat()
+}
+
+/// Features of every image that a pair needs.
+fn describe(
+    extractor: &dyn Extractor,
+    images: &[PathBuf],
+    pairs: &[Pair],
+    width: usize,
+    context: Context<'_>,
+) -> Result<BTreeMap<usize, LocalFeatures>> {
+    let mut needed: Vec<usize> = pairs.iter().flat_map(|(pair, _)| *pair).collect();
+    needed.sort_unstable();
+    needed.dedup();
+    context.observer.start(extractor.name(), needed.len());
+    let mut features = BTreeMap::new();
+    for index in needed {
+        let mut picture = image::decode(&images[index])?;
+        if picture.width() > width {
+            let height = (picture.height() * width).div_ceil(picture.width());
+            picture = resize_bilinear(&picture, ImageSize { width, height })?;
+        }
+        features.insert(index, extractor.extract(&picture)?);
+        context.observer.step();
+    }
+    context.observer.end();
+    Ok(features)
+}
+
+/// Inliers of a homography for every pair.
+fn count(
+    features: &BTreeMap<usize, LocalFeatures>,
+    pairs: &[Pair],
+    matching: MatchParams,
+) -> Result<Vec<f64>> {
+    let of = |(pair, _): &Pair| {
+        let [a, b] = pair.map(|index| &features[&index]);
+        let matches = match_features(a, b, &matching)?;
+        let points = correspondences(a, b, &matches);
+        Ok(homography(&points, &RansacParams::HOMOGRAPHY)?.count() as f64)
+    };
+    pairs.iter().map(of).collect()
+}
+
+fn report(table: &mut Table, row: &str, pairs: &[Pair], counts: &[f64], seed: u64) -> Result<()> {
+    let near: Vec<bool> = pairs.iter().map(|&(_, near)| near).collect();
+    let value = auc_roc(counts, &near)?;
+    let cell = Cell::new(row, COLUMN, value, Provenance::Measured, pairs.len());
+    let resampling = Resampling { seed, ..Resampling::default() };
+    let interval = bootstrap::bootstrap(pairs.len(), &resampling, |chosen| {
+        auc_roc(&bootstrap::pick(counts, chosen), &bootstrap::pick(&near, chosen))
+    })?;
+    table.push(cell.within(interval.low, interval.high, "bootstrap over pairs"));
+    for (column, wanted) in [("inliers, near", true), ("inliers, far", false)] {
+        let mut of: Vec<f64> =
+            counts.iter().zip(&near).filter(|(_, near)| **near == wanted).map(|it| *it.0).collect();
+        of.sort_by(f64::total_cmp);
+        let (n, median) = (of.len(), of.get(of.len() / 2).copied().unwrap_or(0.0));
+        table.push(Cell::new(row, column, median, Provenance::Measured, n).noted("median"));
+    }
+    Ok(())
+}

@@ -1,0 +1,70 @@
+//! The shipped NetVLAD on MobileNetV2.
+
+use burn::{
+    module::{Module, Param},
+    tensor::{Device, Tensor, activation::softmax},
+};
+
+use crate::{
+    Result,
+    backbone::{MobileNetV2, MobileNetV2Config, mobilenet_v2},
+    weights::Weights,
+};
+
+/// Clusters of the shipped weights.
+const CLUSTERS: usize = 16;
+
+/// Ten blocks of MobileNetV2, then a NetVLAD layer whose centres are added (Keras' form).
+#[derive(Module, Debug)]
+pub(super) struct NetVladMobile {
+    trunk: MobileNetV2,
+    /// Scores, `dim × clusters`.
+    kernel: Param<Tensor<2>>,
+    bias: Param<Tensor<1>>,
+    /// `dim × clusters`.
+    centres: Param<Tensor<2>>,
+}
+
+impl NetVladMobile {
+    pub(super) fn new(channels: usize, device: &Device) -> Self {
+        let config = MobileNetV2Config::new().with_channels(channels);
+        let shape = [config.out_channels(), CLUSTERS];
+        let zeros = || Param::from_tensor(Tensor::zeros(shape, device));
+        Self {
+            trunk: config.init(device),
+            kernel: zeros(),
+            bias: Param::from_tensor(Tensor::zeros([CLUSTERS], device)),
+            centres: zeros(),
+        }
+    }
+
+    /// The weights of its file under its own keys.
+    pub(super) fn keys(weights: Weights) -> Result<Weights> {
+        let head = weights.mapped(|key, mut weight| {
+            if key.starts_with("net_vlad_layer_1.") {
+                weight.shape.retain(|&side| side != 1);
+            }
+            Some((key, weight))
+        });
+        mobilenet_v2::from_keras(head)?.renamed(&[
+            (r"^(conv|norm|blocks)\.", "trunk.$1."),
+            (r"^net_vlad_layer_1\.cluster_centers$", "centres"),
+            (r"^net_vlad_layer_1\.weight$", "kernel"),
+            (r"^net_vlad_layer_1\.bias$", "bias"),
+        ])
+    }
+
+    /// Unit descriptors, `n × 64 · 16`.
+    pub(super) fn forward(&self, images: Tensor<4>) -> Tensor<2> {
+        let features = self.trunk.forward(images).flatten::<3>(2, 3);
+        let scores = features.clone().swap_dims(1, 2).matmul(self.kernel.val().unsqueeze())
+            + self.bias.val().unsqueeze();
+        let assignment = softmax(scores, 2);
+        let mass = assignment.clone().sum_dim(1);
+        let sums = features.matmul(assignment) + self.centres.val().unsqueeze::<3>() * mass;
+        let norms = sums.clone().square().sum_dim(1).sqrt().clamp_min(1e-12);
+        let flat = (sums / norms).swap_dims(1, 2).flatten::<2>(1, 2);
+        let norms = flat.clone().square().sum_dim(1).sqrt().clamp_min(1e-12);
+        flat / norms
+    }
+}

@@ -1,0 +1,89 @@
+//! Gradient of a convolution's weights: a matrix product over the output's pixels.
+#![expect(
+    clippy::inline_always,
+    reason = "only what is inlined into the dispatch is compiled for its registers"
+)]
+
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::{
+    geometry::Geometry,
+    lower::Planes,
+    multiply::{DEPTH_BLOCK, Packed, TILE, Tile, accumulate, dispatch},
+};
+
+/// Panels of 16 weights that share one pass over the output's gradient.
+const PANELS: usize = 4;
+
+/// `[n_out, channels · kernel]` from the input and the gradient `[images, n_out, pixels]` of the
+/// output. The sums run over images, then pixels.
+pub(crate) fn weights_gradient(
+    input: &[f32],
+    gradient: &[f32],
+    geometry: &Geometry,
+    output: [usize; 2],
+) -> Vec<f32> {
+    let [_, n_channels, height, width] = geometry.input;
+    let (n_out, depth, n_pixels) = (geometry.n_out, geometry.depth(), output[0] * output[1]);
+    let images: Vec<(Planes<'_>, Packed)> = input
+        .par_chunks_exact(n_channels * height * width)
+        .zip(gradient.par_chunks_exact(n_out * n_pixels))
+        .map(|(image, gradient)| {
+            let packed = Packed::new(n_out, n_pixels, |row, at| gradient[row * n_pixels + at]);
+            (Planes::new(image, geometry, output), packed)
+        })
+        .collect();
+    let n_panels = depth.div_ceil(TILE);
+    let blocks: Vec<usize> = (0..n_panels).step_by(PANELS).collect();
+    let sums = blocks.into_par_iter().map(|first| {
+        let n = PANELS.min(n_panels - first);
+        dispatch(Block { images: &images, first, n, n_groups: n_out.div_ceil(TILE), n_pixels })
+    });
+    let sums: Vec<Vec<Tile>> = sums.collect();
+    let mut values = vec![0.0; n_out * depth];
+    for (row, values) in values.chunks_exact_mut(depth).enumerate() {
+        for (panel, values) in values.chunks_mut(TILE).enumerate() {
+            let block = &sums[panel / PANELS];
+            let n = block.len() / n_out.div_ceil(TILE);
+            let tile = &block[row / TILE * n + panel % PANELS];
+            values.copy_from_slice(&tile[row % TILE][..values.len()]);
+        }
+    }
+    values
+}
+
+/// Some panels of weights, over all images.
+struct Block<'a> {
+    images: &'a [(Planes<'a>, Packed)],
+    first: usize,
+    n: usize,
+    n_groups: usize,
+    n_pixels: usize,
+}
+
+impl WithSimd for Block<'_> {
+    /// `[group][panel]`.
+    type Output = Vec<Tile>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<Tile> {
+        let mut sums = vec![[[0.0; TILE]; TILE]; self.n_groups * self.n];
+        let mut panels = vec![[0.0; TILE]; self.n * DEPTH_BLOCK];
+        for (planes, gradient) in self.images {
+            for start in (0..self.n_pixels).step_by(DEPTH_BLOCK) {
+                let pixels = start..(start + DEPTH_BLOCK).min(self.n_pixels);
+                for (index, panel) in panels.chunks_exact_mut(DEPTH_BLOCK).enumerate() {
+                    planes.lower_weights((self.first + index) * TILE, pixels.clone(), panel);
+                }
+                for (group, sums) in sums.chunks_exact_mut(self.n).enumerate() {
+                    let rows = gradient.group(group, pixels.clone());
+                    for (panel, sums) in panels.chunks_exact(DEPTH_BLOCK).zip(sums) {
+                        accumulate(simd, rows, &panel[..rows.len()], sums);
+                    }
+                }
+            }
+        }
+        sums
+    }
+}

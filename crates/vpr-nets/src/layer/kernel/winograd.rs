@@ -1,0 +1,388 @@
+//! 3×3 convolution of stride 1 by Winograd's minimal filtering `F(4×4, 3×3)`: 36 instead of 144
+//! multiplications per channel for 16 outputs (Lavin and Gray, CVPR 2016).
+//!
+//! Each of the 36 frequencies is a matrix product over channels. The columns of a panel are 16
+//! tiles of 4×4 outputs, taken in order over rows, columns and images.
+#![expect(
+    clippy::inline_always,
+    reason = "only what is inlined into the dispatch is compiled for its registers"
+)]
+
+use std::ops::Range;
+
+use pulp::{Simd, WithSimd};
+use rayon::prelude::*;
+
+use super::{
+    finish::{Activation, Finish},
+    geometry::Geometry,
+    multiply::{DEPTH_BLOCK, Lanes, Packed, TILE, Tile, accumulate, dispatch},
+};
+
+/// Outputs of one tile, per axis.
+const STEP: usize = 4;
+/// Inputs of one tile, per axis.
+const REACH: usize = 6;
+/// Frequencies.
+const N_FREQUENCIES: usize = REACH * REACH;
+/// Transformed input kept at a time, in bytes: well inside the last cache.
+const INPUT_BYTES: usize = 6 << 20;
+
+/// `G` of the algorithm: kernels to frequencies.
+const KERNEL: [[f64; 3]; REACH] = [
+    [0.25, 0.0, 0.0],
+    [-1.0 / 6.0, -1.0 / 6.0, -1.0 / 6.0],
+    [-1.0 / 6.0, 1.0 / 6.0, -1.0 / 6.0],
+    [1.0 / 24.0, 1.0 / 12.0, 1.0 / 6.0],
+    [1.0 / 24.0, -1.0 / 12.0, 1.0 / 6.0],
+    [0.0, 0.0, 1.0],
+];
+
+/// Kernels as frequencies, one packed `n_out × channels` matrix each.
+#[derive(Clone, Debug)]
+pub(super) struct Frequencies(Vec<Packed>);
+
+impl Frequencies {
+    /// Transforms `[n_out, channels, 3, 3]`, in f64.
+    pub(super) fn new(weights: &[f32], n_out: usize, n_channels: usize) -> Self {
+        let kernels = weights.as_chunks::<9>().0;
+        let frequency = |index: usize| {
+            let (rows, columns) = (KERNEL[index / REACH], KERNEL[index % REACH]);
+            Packed::new(n_out, n_channels, |out, channel| {
+                let kernel = &kernels[out * n_channels + channel];
+                let mut sum = 0.0;
+                for (row, kernel) in rows.iter().zip(kernel.as_chunks::<3>().0) {
+                    for (column, &value) in columns.iter().zip(kernel) {
+                        sum += row * column * f64::from(value);
+                    }
+                }
+                #[expect(clippy::cast_possible_truncation, reason = "weights are f32")]
+                let sum = sum as f32;
+                sum
+            })
+        };
+        Self((0..N_FREQUENCIES).into_par_iter().map(frequency).collect())
+    }
+}
+
+/// The tiles of all outputs.
+#[derive(Clone, Copy)]
+struct Tiles {
+    geometry: Geometry,
+    output: [usize; 2],
+    /// Tiles per image, down and across.
+    grid: [usize; 2],
+}
+
+impl Tiles {
+    fn new(geometry: &Geometry, output: [usize; 2]) -> Self {
+        Self { geometry: *geometry, output, grid: output.map(|it| it.div_ceil(STEP)) }
+    }
+
+    fn len(&self) -> usize {
+        self.geometry.input[0] * self.grid[0] * self.grid[1]
+    }
+
+    /// Image and first output row and column of a tile.
+    fn place(&self, tile: usize) -> (usize, [usize; 2]) {
+        let [down, across] = self.grid;
+        let (image, tile) = (tile / (down * across), tile % (down * across));
+        (image, [tile / across * STEP, tile % across * STEP])
+    }
+}
+
+/// Whether this way is likely faster than the direct one: fewer products, but four times the
+/// weights to read and tiles that reach over the edge.
+pub(super) fn suits(geometry: &Geometry, output: [usize; 2]) -> bool {
+    let is_3x3 =
+        geometry.kernel == [3, 3] && geometry.stride == [1, 1] && geometry.dilation == [1, 1];
+    if !is_3x3 || geometry.input[1] < TILE || geometry.n_out < TILE {
+        return false;
+    }
+    let tiles = Tiles::new(geometry, output).len().next_multiple_of(TILE);
+    let pixels = geometry.input[0] * (output[0] * output[1]).next_multiple_of(TILE);
+    // In multiplications of one pair of channels; reading a weight costs about as much as 7.
+    let weight = 7.0 / 1.0;
+    let direct = 9.0 * (pixels as f64 + weight);
+    let here = 36.0 * (1.3 * tiles as f64 + weight);
+    here < direct
+}
+
+/// Convolves a batch into `[images, n_out, pixels]`.
+pub(super) fn convolve(
+    input: &[f32],
+    weights: &Frequencies,
+    geometry: &Geometry,
+    output: [usize; 2],
+    finish: Finish<'_>,
+) -> Vec<f32> {
+    let tiles = Tiles::new(geometry, output);
+    let [n_images, n_channels, ..] = geometry.input;
+    let n_pixels = output[0] * output[1];
+    let mut values = vec![0.0; n_images * geometry.n_out * n_pixels];
+    let n_panels = tiles.len().div_ceil(TILE);
+    let per_block = (INPUT_BYTES / (N_FREQUENCIES * n_channels * size_of::<Lanes>())).max(1);
+    for first in (0..n_panels).step_by(per_block) {
+        let panels = first..(first + per_block).min(n_panels);
+        let transformed = transform(input, &tiles, panels.clone());
+        let n_groups = geometry.n_out.div_ceil(TILE);
+        let per_part = n_groups.div_ceil(2 * rayon::current_num_threads()).max(1);
+        let mut parts: Vec<Vec<&mut [f32]>> = Vec::new();
+        parts.resize_with(n_groups.div_ceil(per_part), Vec::new);
+        for (index, row) in values.chunks_exact_mut(n_pixels).enumerate() {
+            parts[index % geometry.n_out / (per_part * TILE)].push(row);
+        }
+        parts.into_par_iter().enumerate().for_each(|(part, rows)| {
+            let groups = part * per_part..((part + 1) * per_part).min(n_groups);
+            let panels = panels.clone();
+            let part =
+                Part { transformed: &transformed, weights, tiles, panels, groups, rows, finish };
+            dispatch(part);
+        });
+    }
+    values
+}
+
+/// The input of some panels as frequencies, `[panel][channel block][frequency][channel]`.
+struct Transformed {
+    blocks: Vec<Vec<Lanes>>,
+    channels: Vec<Range<usize>>,
+}
+
+fn transform(input: &[f32], tiles: &Tiles, panels: Range<usize>) -> Transformed {
+    let n_channels = tiles.geometry.input[1];
+    // Enough pieces for all threads; the sums do not depend on where a block ends.
+    let n_blocks = rayon::current_num_threads().div_ceil(panels.len());
+    let per_block = n_channels.div_ceil(n_blocks).clamp(1, DEPTH_BLOCK);
+    let starts = (0..n_channels).step_by(per_block);
+    let channels: Vec<_> = starts.map(|it| it..(it + per_block).min(n_channels)).collect();
+    let pieces: Vec<_> =
+        panels.flat_map(|panel| channels.iter().map(move |it| (panel, it.clone()))).collect();
+    let blocks = pieces.into_par_iter();
+    let blocks = blocks.map(|(panel, channels)| dispatch(Piece { input, tiles, panel, channels }));
+    Transformed { blocks: blocks.collect(), channels }
+}
+
+/// Some channels of a panel, to be transformed.
+struct Piece<'a> {
+    input: &'a [f32],
+    tiles: &'a Tiles,
+    panel: usize,
+    channels: Range<usize>,
+}
+
+impl WithSimd for Piece<'_> {
+    type Output = Vec<Lanes>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<Lanes> {
+        let n = self.channels.len();
+        let mut blocks = vec![[0.0; TILE]; N_FREQUENCIES * n];
+        let [_, n_channels, height, width] = self.tiles.geometry.input;
+        let last = ((self.panel + 1) * TILE).min(self.tiles.len());
+        let places: Vec<_> = (self.panel * TILE..last).map(|it| self.tiles.place(it)).collect();
+        let before = self.tiles.geometry.before;
+        let mut patch = [[0.0; TILE]; N_FREQUENCIES];
+        for (index, channel) in self.channels.enumerate() {
+            for (lane, &(image, [top, left])) in places.iter().enumerate() {
+                let plane = &self.input[(image * n_channels + channel) * height * width..];
+                let plane = &plane[..height * width];
+                gather(plane, [height, width], [top, left], before, lane, &mut patch);
+            }
+            frequencies_of_input(&mut patch);
+            for (frequency, lanes) in patch.iter().enumerate() {
+                blocks[frequency * n + index] = *lanes;
+            }
+        }
+        blocks
+    }
+}
+
+/// Copies the 6×6 inputs of a tile into one lane, zeros where the padding is.
+#[inline(always)]
+fn gather(
+    plane: &[f32],
+    [height, width]: [usize; 2],
+    [top, left]: [usize; 2],
+    before: [usize; 2],
+    lane: usize,
+    patch: &mut [Lanes; N_FREQUENCIES],
+) {
+    let is_inside = top >= before[0]
+        && left >= before[1]
+        && top + REACH <= height + before[0]
+        && left + REACH <= width + before[1];
+    if is_inside {
+        let start = (top - before[0]) * width + left - before[1];
+        for (row, patch) in patch.as_chunks_mut::<REACH>().0.iter_mut().enumerate() {
+            let source: &[f32] = &plane[start + row * width..][..REACH];
+            for (lanes, &value) in patch.iter_mut().zip(source) {
+                lanes[lane] = value;
+            }
+        }
+        return;
+    }
+    for (index, lanes) in patch.iter_mut().enumerate() {
+        let y = (top + index / REACH).checked_sub(before[0]).filter(|&it| it < height);
+        let x = (left + index % REACH).checked_sub(before[1]).filter(|&it| it < width);
+        lanes[lane] = y.zip(x).map_or(0.0, |(y, x)| plane[y * width + x]);
+    }
+}
+
+/// `Bᵀ d B`, in place.
+#[inline(always)]
+fn frequencies_of_input(patch: &mut [Lanes; N_FREQUENCIES]) {
+    for row in 0..REACH {
+        let line = input_line(std::array::from_fn(|i| patch[row * REACH + i]));
+        for (i, lanes) in line.into_iter().enumerate() {
+            patch[row * REACH + i] = lanes;
+        }
+    }
+    for column in 0..REACH {
+        let line = input_line(std::array::from_fn(|i| patch[i * REACH + column]));
+        for (i, lanes) in line.into_iter().enumerate() {
+            patch[i * REACH + column] = lanes;
+        }
+    }
+}
+
+/// One axis of [`frequencies_of_input`].
+#[inline(always)]
+fn input_line(d: [Lanes; REACH]) -> [Lanes; REACH] {
+    let mut line = [[0.0; TILE]; REACH];
+    for i in 0..TILE {
+        let d = d.map(|lanes| lanes[i]);
+        let (even, odd) = (d[4] - 4.0 * d[2], d[3] - 4.0 * d[1]);
+        let (even_2, odd_2) = (d[4] - d[2], 2.0 * (d[3] - d[1]));
+        line[0][i] = 4.0 * d[0] - 5.0 * d[2] + d[4];
+        line[1][i] = even + odd;
+        line[2][i] = even - odd;
+        line[3][i] = even_2 + odd_2;
+        line[4][i] = even_2 - odd_2;
+        line[5][i] = 4.0 * d[1] - 5.0 * d[3] + d[5];
+    }
+    line
+}
+
+/// One axis of `Aᵀ m A`.
+#[inline(always)]
+fn output_line(m: [Lanes; REACH]) -> [Lanes; STEP] {
+    let mut line = [[0.0; TILE]; STEP];
+    for i in 0..TILE {
+        let m = m.map(|lanes| lanes[i]);
+        let (sum, difference) = (m[1] + m[2], m[1] - m[2]);
+        let (sum_2, difference_2) = (m[3] + m[4], m[3] - m[4]);
+        line[0][i] = m[0] + sum + sum_2;
+        line[1][i] = difference + 2.0 * difference_2;
+        line[2][i] = sum + 4.0 * sum_2;
+        line[3][i] = difference + 8.0 * difference_2 + m[5];
+    }
+    line
+}
+
+/// Some output channels of some panels.
+struct Part<'a> {
+    transformed: &'a Transformed,
+    weights: &'a Frequencies,
+    tiles: Tiles,
+    panels: Range<usize>,
+    groups: Range<usize>,
+    /// Planes of these channels, `[image][channel]`.
+    rows: Vec<&'a mut [f32]>,
+    finish: Finish<'a>,
+}
+
+impl WithSimd for Part<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, simd: S) {
+        let n_blocks = self.transformed.channels.len();
+        let n_panels = self.panels.len();
+        let mut sums = vec![[[0.0; TILE]; TILE]; N_FREQUENCIES * n_panels];
+        for group in self.groups.clone() {
+            sums.fill([[0.0; TILE]; TILE]);
+            for (frequency, weights) in self.weights.0.iter().enumerate() {
+                for (block, channels) in self.transformed.channels.iter().enumerate() {
+                    let rows = weights.group(group, channels.clone());
+                    for panel in 0..n_panels {
+                        let lanes = &self.transformed.blocks[panel * n_blocks + block];
+                        let lanes = &lanes[frequency * rows.len()..][..rows.len()];
+                        accumulate(simd, rows, lanes, &mut sums[panel * N_FREQUENCIES + frequency]);
+                    }
+                }
+            }
+            for (index, sums) in sums.as_chunks::<N_FREQUENCIES>().0.iter().enumerate() {
+                self.store(self.panels.start + index, group, sums);
+            }
+        }
+    }
+}
+
+impl Part<'_> {
+    /// Transforms the sums of 16 channels and 16 tiles back and stores what lies inside.
+    #[inline(always)]
+    fn store(&mut self, panel: usize, group: usize, sums: &[Tile; N_FREQUENCIES]) {
+        let n_out = self.tiles.geometry.n_out;
+        let per_image = (self.groups.end * TILE).min(n_out) - self.groups.start * TILE;
+        let last = ((panel + 1) * TILE).min(self.tiles.len());
+        for channel in group * TILE..((group + 1) * TILE).min(n_out) {
+            let row = channel % TILE;
+            let half: [[Lanes; STEP]; REACH] = std::array::from_fn(|x| {
+                output_line(std::array::from_fn(|y| sums[y * REACH + x][row]))
+            });
+            let whole: [[Lanes; STEP]; STEP] =
+                std::array::from_fn(|y| output_line(std::array::from_fn(|x| half[x][y])));
+            let whole = whole.map(|line| line.map(|it| self.scaled(channel, it)));
+            for (lane, tile) in (panel * TILE..last).enumerate() {
+                let (image, [top, left]) = self.tiles.place(tile);
+                let at = (image * n_out + channel) * self.tiles.output[0] * self.tiles.output[1];
+                let plane = &mut *self.rows[image * per_image + channel - self.groups.start * TILE];
+                scatter(&whole, lane, plane, at, [top, left], self.tiles.output, &self.finish);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn scaled(&self, channel: usize, mut lanes: Lanes) -> Lanes {
+        let scale = self.finish.scale.map_or(1.0, |it| it[channel]);
+        let shift = self.finish.shift.map_or(0.0, |it| it[channel]);
+        for lane in &mut lanes {
+            *lane = *lane * scale + shift;
+        }
+        lanes
+    }
+}
+
+/// Stores one lane's 4×4 outputs as far as they lie inside.
+#[inline(always)]
+fn scatter(
+    whole: &[[Lanes; STEP]; STEP],
+    lane: usize,
+    plane: &mut [f32],
+    at: usize,
+    [top, left]: [usize; 2],
+    [height, width]: [usize; 2],
+    finish: &Finish<'_>,
+) {
+    let n = STEP.min(width - left);
+    for (row, line) in whole.iter().enumerate().take(height - top) {
+        let start = (top + row) * width + left;
+        let mut values = line.map(|lanes| lanes[lane]);
+        if let Some(residual) = finish.residual {
+            for (value, residual) in values.iter_mut().zip(&residual[at + start..][..n]) {
+                *value += residual;
+            }
+        }
+        match finish.activation {
+            Activation::None => {}
+            Activation::Relu => values.iter_mut().for_each(|it| *it = it.max(0.0)),
+            Activation::Relu6 => values.iter_mut().for_each(|it| *it = it.clamp(0.0, 6.0)),
+        }
+        if n == STEP {
+            plane[start..start + STEP].copy_from_slice(&values);
+        } else {
+            plane[start..start + n].copy_from_slice(&values[..n]);
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! Layers shared by all networks; the one place that decides which implementation runs.
+
+mod conv2d;
+mod conv_norm;
+mod gradient;
+mod kernel;
+
+pub use conv_norm::conv_norm;
+pub use conv2d::{Conv2d, Conv2dConfig};
+pub use kernel::Activation;

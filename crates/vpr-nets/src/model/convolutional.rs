@@ -1,0 +1,155 @@
+//! Networks on ResNet and VGG16.
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+
+use super::keys::{SEQUENTIAL_RESNET, SEQUENTIAL_VGG, resnet};
+use super::{Describe, Loaded, Parts};
+use crate::Result;
+use crate::aggregate::{
+    Boq, BoqConfig, ConvAp, ConvApConfig, CosPlace, CosPlaceConfig, Gem, GemConfig, MixVpr,
+    MixVprConfig, mixvpr as mixing,
+};
+use crate::backbone::vgg::Crop;
+use crate::backbone::{ResNet, Vgg16, Vgg16Config};
+use crate::infer::Shapes;
+use crate::normalize::normalize;
+use crate::weights::Weights;
+
+/// A convolutional backbone: what CosPlace and EigenPlaces were published on.
+#[derive(Module, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one per network")]
+pub enum Trunk {
+    /// Any ResNet.
+    ResNet(ResNet),
+    /// VGG16 to its last convolution.
+    Vgg16(Vgg16),
+}
+
+impl Trunk {
+    fn forward(&self, images: Tensor<4>) -> Tensor<4> {
+        match self {
+            Self::ResNet(network) => network.forward(images),
+            Self::Vgg16(network) => network.forward(images),
+        }
+    }
+}
+
+impl Describe for Parts<ResNet, Boq> {
+    fn describe(&self, images: Tensor<4>) -> Tensor<2> {
+        self.aggregator.forward(self.backbone.forward(images))
+    }
+}
+
+impl Describe for Parts<ResNet, MixVpr> {
+    fn describe(&self, images: Tensor<4>) -> Tensor<2> {
+        self.aggregator.forward(self.backbone.forward(images))
+    }
+
+    fn accepts(&self, height: usize, width: usize) -> Result<(), String> {
+        /// Pixels per position behind layer3.
+        const STRIDE: usize = 16;
+        match self.aggregator.positions() {
+            positions if height.div_ceil(STRIDE) * width.div_ceil(STRIDE) == positions => Ok(()),
+            positions => Err(format!(
+                "MixVPR was trained on {positions} positions of {STRIDE} pixels, such as 320×320 for 400"
+            )),
+        }
+    }
+}
+
+impl Describe for Parts<ResNet, ConvAp> {
+    fn describe(&self, images: Tensor<4>) -> Tensor<2> {
+        self.aggregator.forward(self.backbone.forward(images))
+    }
+}
+
+impl Describe for Parts<Trunk, CosPlace> {
+    fn describe(&self, images: Tensor<4>) -> Tensor<2> {
+        self.aggregator.forward(self.backbone.forward(images))
+    }
+}
+
+impl Describe for Parts<ResNet, Gem> {
+    fn describe(&self, images: Tensor<4>) -> Tensor<2> {
+        normalize(self.aggregator.forward(self.backbone.forward(images)), 1)
+    }
+}
+
+/// BoQ on ResNet-50 to layer3: `resnet50_16384.pth` of `amaralibey/Bag-of-Queries`.
+///
+/// # Errors
+///
+/// As [`open`](super::open).
+pub fn boq_resnet50(weights: Weights, device: &Device) -> Result<Loaded<Parts<ResNet, Boq>>> {
+    let weights = weights.renamed(&SEQUENTIAL_RESNET)?;
+    let backbone = resnet(&weights, "backbone.")?;
+    let head = BoqConfig::from_weights(&weights, "aggregator.")?;
+    Loaded::new(backbone.init(device), head.init(device), head.dimension(), weights)
+}
+
+/// MixVPR on ResNet-50 to layer3: `resnet50_MixVPR_4096_channels(1024)_rows(4).ckpt` and the smaller
+/// ones of `amaralibey/MixVPR`.
+///
+/// # Errors
+///
+/// As [`open`](super::open).
+pub fn mixvpr(weights: Weights, device: &Device) -> Result<Loaded<Parts<ResNet, MixVpr>>> {
+    let weights = weights.renamed(&[(r"^backbone\.model\.", "backbone.")])?;
+    let weights = mixing::from_official(weights)?;
+    let backbone = resnet(&weights, "backbone.")?;
+    let head = MixVprConfig::from_weights(&weights, "aggregator.")?;
+    let dimension = head.out_channels * head.out_rows;
+    Loaded::new(backbone.init(device), head.init(device), dimension, weights)
+}
+
+/// ConvAP on ResNet-50: `resnet50_ConvAP_1024_2x2.ckpt` and others of `amaralibey/gsv-cities`.
+///
+/// # Errors
+///
+/// As [`open`](super::open).
+pub fn convap(weights: Weights, device: &Device) -> Result<Loaded<Parts<ResNet, ConvAp>>> {
+    let weights = weights.renamed(&[(r"^backbone\.model\.", "backbone.")])?;
+    let backbone = resnet(&weights, "backbone.")?;
+    let head = ConvApConfig::from_weights(&weights, "aggregator.")?;
+    let dimension = head.reduced * head.cells[0] * head.cells[1];
+    Loaded::new(backbone.init(device), head.init(device), dimension, weights)
+}
+
+/// CosPlace and EigenPlaces, which are one network, on any ResNet or VGG16:
+/// `ResNet50_2048_cosplace.pth`, … of `gmberton/CosPlace`, `ResNet50_2048_eigenplaces.pth`, … of
+/// `gmberton/EigenPlaces`.
+///
+/// # Errors
+///
+/// As [`open`](super::open).
+pub fn cosplace(weights: Weights, device: &Device) -> Result<Loaded<Parts<Trunk, CosPlace>>> {
+    let head =
+        [(r"^aggregation\.1\.p$", "aggregator.gem.p"), (r"^aggregation\.3\.", "aggregator.fc.")];
+    let weights = weights.renamed(&head)?;
+    // VGG16 begins with a 3×3 convolution, a ResNet with one of 7×7.
+    let (weights, backbone) = if Shapes::new(&weights, "").axis("backbone.0.weight", 2)? == 3 {
+        let network = Vgg16Config::new().with_crop(Crop::Conv5).init(device);
+        (weights.renamed(&SEQUENTIAL_VGG)?, Trunk::Vgg16(network))
+    } else {
+        let weights = weights.renamed(&SEQUENTIAL_RESNET)?;
+        let network = resnet(&weights, "backbone.")?.init(device);
+        (weights, Trunk::ResNet(network))
+    };
+    let head = CosPlaceConfig::from_weights(&weights, "aggregator.")?;
+    Loaded::new(backbone, head.init(device), head.dimension, weights)
+}
+
+/// GeM on ResNet-50, the network of STUN without its variance: `teacher_triplet/ckpt.pth.tar` of
+/// `ramdrop/stun`; the variance head of a student is left out.
+///
+/// # Errors
+///
+/// As [`open`](super::open).
+pub fn gem_resnet50(weights: Weights, device: &Device) -> Result<Loaded<Parts<ResNet, Gem>>> {
+    let own = [(r"^backbone\.8\.p$", "aggregator.p"), (r"^var_head\..*$", "")];
+    let weights = weights.renamed(&own)?.renamed(&SEQUENTIAL_RESNET)?;
+    let backbone = resnet(&weights, "backbone.")?;
+    let dimension = backbone.channels();
+    Loaded::new(backbone.init(device), GemConfig::new().init(device), dimension, weights)
+}

@@ -1,0 +1,50 @@
+//! Tensors as slices, where they lie in this process's memory and nothing records gradients.
+
+use std::sync::Arc;
+
+use burn::{
+    backend::{BackendTensor, DispatchTensorKind, flex::FlexTensor},
+    tensor::{Bytes, DType, Device, Tensor, TensorData},
+};
+
+/// A contiguous f32 tensor on the CPU.
+#[derive(Clone, Debug)]
+pub(crate) struct Plain(FlexTensor);
+
+impl Plain {
+    /// The tensor's values in order; `None` if it is recorded for gradients, lies on another
+    /// device or holds other numbers.
+    pub(crate) fn new<const D: usize>(tensor: &Tensor<D>) -> Option<Self> {
+        match tensor.clone().into_dispatch().kind {
+            DispatchTensorKind::Flex(BackendTensor::Float(tensor))
+                if tensor.dtype() == DType::F32 =>
+            {
+                Some(Self(tensor.to_contiguous()))
+            }
+            _ => None,
+        }
+    }
+
+    /// The values in row-major order.
+    pub(crate) fn values(&self) -> &[f32] {
+        let layout = self.0.layout();
+        &self.0.storage::<f32>()[layout.start_offset()..][..layout.num_elements()]
+    }
+
+    /// Whether both are the same memory, so that what was made from one holds for the other as
+    /// long as both live.
+    pub(crate) fn is_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0.data_arc(), &other.0.data_arc())
+            && self.0.layout().start_offset() == other.0.layout().start_offset()
+    }
+}
+
+/// A tensor of these values.
+pub(crate) fn tensor<const D: usize>(
+    values: Vec<f32>,
+    shape: [usize; D],
+    device: &Device,
+) -> Tensor<D> {
+    let bytes = Bytes::from_elems(values);
+    Tensor::from_data(TensorData::from_bytes(bytes, shape, DType::F32), device)
+}

@@ -1,0 +1,120 @@
+"""Time of convolutions, ResNet-34 and a training step, ours against PyTorch's, alternately.
+
+Two threads each. PyTorch runs with the malloc settings that keep it from returning its buffers to
+the system at each call; without them it looks two to three times slower on convolutions.
+"""
+
+import argparse
+import os
+import statistics
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+MALLOC = {
+    "MALLOC_MMAP_THRESHOLD_": "4294967296",
+    "MALLOC_TRIM_THRESHOLD_": "17179869184",
+    "MALLOC_TOP_PAD_": "67108864",
+}
+if any(os.environ.get(name) != value for name, value in MALLOC.items()):
+    os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, **MALLOC})
+
+import torch
+import torchvision
+
+ROOT = Path(__file__).resolve().parents[2]
+LAYERS = [
+    (8, 64, 64, 56, 3, 1),
+    (8, 3, 64, 224, 7, 2),
+    (8, 128, 128, 28, 3, 1),
+    (8, 256, 256, 14, 3, 1),
+    (8, 512, 512, 7, 3, 1),
+    (8, 64, 128, 56, 3, 2),
+    (8, 64, 256, 56, 1, 1),
+    (1, 64, 64, 56, 3, 1),
+    (1, 512, 512, 7, 3, 1),
+]
+# Ours at most this many times PyTorch's.
+LIMITS = {"resnet34 1": 1.4, "resnet34 8": 1.4, "train 16": 2.0}
+
+
+def layer(images, channels, out, side, kernel, stride):
+    conv = torch.nn.Conv2d(channels, out, kernel, stride, kernel // 2).eval()
+    data = torch.randn(images, channels, side, side)
+    return lambda: conv(data)
+
+
+def resnet34(images):
+    network = torchvision.models.resnet34().eval()
+    network.avgpool = network.fc = torch.nn.Identity()
+    data = torch.randn(images, 3, 224, 224)
+    return lambda: network(data)
+
+
+def training_step(images):
+    network = torchvision.models.resnet18(num_classes=10).train()
+    adam = torch.optim.Adam(network.parameters(), 1e-3)
+    data, classes = torch.randn(images, 3, 96, 96), torch.arange(images) % 10
+
+    def step():
+        adam.zero_grad(set_to_none=True)
+        torch.nn.functional.cross_entropy(network(data), classes).backward()
+        adam.step()
+
+    return step
+
+
+def build() -> Path:
+    example = "convolution_time"
+    command = ["cargo", "build", "--quiet", "--package", "vpr-nets", "--example", example]
+    subprocess.run(command, cwd=ROOT, check=True)
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    return target / "debug/examples" / example
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument("--binary", type=Path, help="the built example, if it is not to be built")
+    parser.add_argument("--only", help="cases that start with this")
+    args = parser.parse_args()
+    torch.set_num_threads(2)
+    cases = {"layer " + " ".join(map(str, it)): layer(*it) for it in LAYERS}
+    cases |= {"resnet34 1": resnet34(1), "resnet34 8": resnet34(8), "train 16": training_step(16)}
+    cases = {name: it for name, it in cases.items() if name.startswith(args.only or "")}
+    ours = subprocess.Popen(
+        [args.binary or build()],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        bufsize=1,
+        env={**os.environ, "RAYON_NUM_THREADS": "2"},
+    )
+    print(f"PyTorch {torch.__version__}, 2 threads, {args.rounds} rounds, medians (minima) in ms")
+    missed = False
+    for name, peer in cases.items():
+        times = {"peer": [], "ours": []}
+        for _ in range(args.rounds + 2):
+            start = time.perf_counter_ns()
+            with torch.inference_mode(not name.startswith("train")):
+                peer()
+            times["peer"].append((time.perf_counter_ns() - start) / 1e6)
+            ours.stdin.write(name + "\n")
+            ours.stdin.flush()
+            times["ours"].append(int(ours.stdout.readline()) / 1e6)
+        times = {who: it[2:] for who, it in times.items()}
+        theirs, mine = (statistics.median(times[who]) for who in ("peer", "ours"))
+        print(
+            f"{name:28} PyTorch {theirs:.2f} ({min(times['peer']):.2f})  "
+            f"ours {mine:.2f} ({min(times['ours']):.2f})  ratio {mine / theirs:.2f}",
+            flush=True,
+        )
+        missed |= mine / theirs > LIMITS.get(name, float("inf"))
+    ours.stdin.close()
+    ours.wait()
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
