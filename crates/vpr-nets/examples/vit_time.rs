@@ -2,7 +2,7 @@
 //!
 //! `vit_time small|base|large SIDE BATCH [halves] [WEIGHTS IO]`: with `halves` two half-batches run on
 //! two threads; with files, the tokens are compared with those in `IO` first.
-#![allow(clippy::print_stdout, reason = "this is a program")]
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "this is a program")]
 
 use std::error::Error;
 use std::io::{self, BufRead, Write};
@@ -15,12 +15,12 @@ use vpr_nets::weights::Weights;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [size, side, batch, rest @ ..] = &arguments[..] else {
+    let [variant, side, batch, rest @ ..] = &arguments[..] else {
         return Err("needs a size, a side and a batch".into());
     };
     let (side, batch): (usize, usize) = (side.parse()?, batch.parse()?);
     let device = Device::flex();
-    let mut network = match size.as_str() {
+    let mut network = match variant.as_str() {
         "small" => DinoV2Config::small(),
         "base" => DinoV2Config::base(),
         "large" => DinoV2Config::large(),

@@ -74,6 +74,10 @@ impl DescriptorRegressorConfig {
 impl DescriptorRegressor {
     /// Regresses descriptors (`batch × dimension`) from those of anchors (same shape) and the pose
     /// relative to each anchor (`batch × 7`). The result is not normalised, as released (C-1).
+    ///
+    /// # Panics
+    ///
+    /// If the shapes do not fit.
     #[must_use]
     pub fn forward(&self, anchor: Tensor<2>, relative_pose: Tensor<2>) -> Tensor<2> {
         let x = Tensor::cat(vec![anchor, relative_pose], 1);

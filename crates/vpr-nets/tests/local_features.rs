@@ -79,7 +79,7 @@ impl Golden {
             ours.len(),
             theirs.len()
         );
-        assert!(common as f64 >= 0.98 * theirs.len() as f64, "{name}: {common}");
+        assert!(f64::from(common) >= 0.98 * theirs.len() as f64, "{name}: {common}");
         assert!(farthest <= 1e-3, "{name}: {farthest}");
         assert!(score_off <= 1e-3, "{name}: {score_off}");
     }

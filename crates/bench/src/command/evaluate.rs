@@ -26,6 +26,7 @@ use super::{
 
 /// The flags of VPR-methods-evaluation, in kebab case; the names with underscores work too.
 #[derive(clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "one per flag")]
 pub(crate) struct EvaluateArgs {
     /// Folder of the reference images, with `@utm_east@utm_north@…` names
     #[arg(long, alias = "database_folder", value_name = "DIR", requires = "queries_folder")]
@@ -199,7 +200,7 @@ fn by_network(
     let bar = cli::progress(encoder.name(), queries.names.len() + references.names.len());
     let encode = |paths: &[PathBuf], before: usize| {
         encode_files(&*encoder, paths, &options, &mut |done| {
-            bar.set_position((before + done) as u64)
+            bar.set_position((before + done) as u64);
         })
     };
     let query_rows = encode(&queries.names, 0)?;

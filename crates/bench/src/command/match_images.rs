@@ -226,9 +226,10 @@ fn json(
 }
 
 fn csv(features: &[LocalFeatures; 2], matches: &[Match], inliers: &Inliers) -> String {
+    use std::fmt::Write as _;
     let mut text = "a_x,a_y,b_x,b_y,distance,inlier\n".to_owned();
     for Line { a, b, distance, inlier } in lines(features, matches, inliers) {
-        text += &format!("{},{},{},{},{distance},{inlier}\n", a[0], a[1], b[0], b[1]);
+        let _ = writeln!(text, "{},{},{},{},{distance},{inlier}", a[0], a[1], b[0], b[1]);
     }
     text
 }

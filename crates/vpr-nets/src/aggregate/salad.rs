@@ -182,7 +182,7 @@ fn log_sum_exp(x: Tensor<3>, dim: usize) -> Tensor<3> {
     (x - largest.clone()).exp().sum_dim(dim).log() + largest
 }
 
-/// Two linear layers with ReLU between.
+/// Two linear layers with `ReLU` between.
 #[derive(Module, Debug)]
 struct Perceptron {
     inner: Linear,
@@ -195,7 +195,7 @@ impl Perceptron {
     }
 }
 
-/// Two 1×1 convolutions with dropout and ReLU between.
+/// Two 1×1 convolutions with dropout and `ReLU` between.
 #[derive(Module, Debug)]
 struct Reduction {
     inner: Conv2d,

@@ -275,10 +275,8 @@ impl Conv2d {
 
 /// Whether a tensor lies in memory, recorded for gradients or not.
 fn is_recorded_here(kind: &DispatchTensorKind) -> bool {
-    let inner = match kind {
-        DispatchTensorKind::Autodiff(inner) => inner,
-        _ => kind,
-    };
+    let inner: &DispatchTensorKind =
+        if let DispatchTensorKind::Autodiff(inner) = kind { inner } else { kind };
     matches!(inner, DispatchTensorKind::Flex(_))
 }
 

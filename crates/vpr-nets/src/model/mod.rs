@@ -108,6 +108,7 @@ pub const NAMES: [&str; 9] = [
 ///
 /// [`Error::Weights`](crate::Error::Weights) lists the keys that are missing, unexpected or of
 /// another shape; [`Error::Core`](crate::Error::Core) names a key whose shape no such network has.
+#[must_use]
 pub fn open(name: &str, weights: Weights, device: &Device) -> Option<Result<Box<dyn Model>>> {
     fn boxed<M: Describe + Send + Sync + 'static>(
         loaded: Result<Loaded<M>>,

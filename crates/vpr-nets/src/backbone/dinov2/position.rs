@@ -63,8 +63,7 @@ fn cubic_weights(to: usize, from: usize, scale: f32) -> Vec<f32> {
             .iter()
             .enumerate()
         {
-            let index = (first as i64 + tap as i64 - 1).clamp(0, from as i64 - 1);
-            row[index as usize] += weight;
+            row[index(first + tap as f32 - 1.0, from - 1)] += weight;
         }
     }
     weights
