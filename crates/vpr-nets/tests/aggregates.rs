@@ -10,8 +10,8 @@ use burn::module::Module;
 use burn::store::ModuleSnapshot;
 use burn::tensor::{Device, Tensor};
 use vpr_nets::aggregate::{
-    Boq, BoqConfig, CosPlaceConfig, CricaVprConfig, MixVprConfig, NetVladConfig, SaladConfig,
-    cosplace, cricavpr, mixvpr, salad,
+    Boq, BoqConfig, ConvApConfig, CosPlaceConfig, CricaVprConfig, GemConfig, MixVprConfig,
+    NetVladConfig, SaladConfig, cosplace, cricavpr, mixvpr, salad,
 };
 use vpr_nets::backbone::{DinoV2, DinoV2Config};
 use vpr_nets::model;
@@ -34,6 +34,32 @@ fn check<M: Module + ModuleSnapshot>(
         weights.apply(&mut network).unwrap();
         hold(&network, &folder);
     }
+}
+
+#[test]
+fn gem_is_the_power_mean() {
+    let device = Device::flex();
+    let map = Tensor::<4>::from_data([[[[1.0, 2.0], [3.0, 4.0]]]], &device);
+    let mean = GemConfig::new().init(&device).forward(map).into_scalar::<f32>();
+    // ((1 + 8 + 27 + 64) / 4)^(1/3)
+    assert!((mean - 25.0_f32.cbrt()).abs() < 1e-5, "{mean}");
+}
+
+#[test]
+fn convap_keeps_the_cells_of_a_map_apart() {
+    let device = Device::flex();
+    device.seed(1);
+    let mut config = ConvApConfig::new(3);
+    (config.reduced, config.cells) = (5, [2, 2]);
+    let head = config.init(&device);
+    let map = Tensor::<4>::ones([1, 3, 4, 4], &device);
+    let plain = head.forward(map.clone());
+    assert_eq!(plain.dims(), [1, 5 * 2 * 2]);
+    let norm = plain.clone().square().sum().sqrt().into_scalar::<f32>();
+    assert!((norm - 1.0).abs() < 1e-5, "{norm}");
+    let corner = map.slice_assign([0..1, 0..3, 0..1, 0..1], Tensor::zeros([1, 3, 1, 1], &device));
+    let change = (head.forward(corner) - plain).abs().max().into_scalar::<f32>();
+    assert!(change > 1e-4, "a corner makes no difference: {change}");
 }
 
 #[test]
