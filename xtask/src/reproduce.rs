@@ -26,6 +26,9 @@ pub(crate) struct Args {
     /// Folder of the datasets
     #[arg(long, env = "VPR_DATA", value_name = "DIR", default_value = "data")]
     data: PathBuf,
+    /// Folder that keeps generated places once they are rendered; `data/worlds` by default
+    #[arg(long, env = "VPR_CACHE", value_name = "DIR")]
+    cache: Option<PathBuf>,
     /// Format on stdout: table, csv, json or markdown
     #[arg(long, value_name = "FORMAT", default_value = "table")]
     format: String,
@@ -63,21 +66,38 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         bail!("no experiment `{id}`; `cargo xtask reproduce --list` names them");
     }
     let mut worst = 0;
-    for id in ids {
-        let code = reproduce(&root, id, args)?;
+    for (chapter, ids) in by_chapter(&root, ids)? {
+        let code = reproduce(&root, &chapter, &ids, args)?;
         worst = worst.max(code);
     }
     Ok(ExitCode::from(worst))
 }
 
-fn reproduce(root: &Path, id: &str, args: &Args) -> anyhow::Result<u8> {
-    let chapter = read(root, id)?.chapter;
+/// The ids of each chapter, chapters in the order of their first id: one process runs them all,
+/// so that it can share what they have in common.
+fn by_chapter<'a>(root: &Path, ids: &'a [String]) -> anyhow::Result<Vec<(String, Vec<&'a str>)>> {
+    let mut chapters: Vec<(String, Vec<&str>)> = Vec::new();
+    for id in ids {
+        let chapter = read(root, id)?.chapter;
+        match chapters.iter_mut().find(|(known, _)| *known == chapter) {
+            Some((_, ids)) => ids.push(id),
+            None => chapters.push((chapter, vec![id])),
+        }
+    }
+    Ok(chapters)
+}
+
+fn reproduce(root: &Path, chapter: &str, ids: &[&str], args: &Args) -> anyhow::Result<u8> {
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
-    command.current_dir(root).args(["run", "--quiet", "--bin", &chapter]);
-    command.args(["--", "run"]).arg(format!("experiments/{id}.toml"));
-    let data = env::current_dir().context("current folder")?.join(&args.data);
-    command.arg("--data").arg(data).args(["--format", &args.format]);
+    command.current_dir(root).args(["run", "--quiet", "--bin", chapter]);
+    command.args(["--", "run"]).args(ids.iter().map(|id| format!("experiments/{id}.toml")));
+    let from_here =
+        |path: &Path| env::current_dir().context("current folder").map(|it| it.join(path));
+    command.arg("--data").arg(from_here(&args.data)?).args(["--format", &args.format]);
+    if let Some(cache) = &args.cache {
+        command.arg("--cache").arg(from_here(cache)?);
+    }
     for (is_set, flag) in [(args.write, "--write"), (args.check, "--check")] {
         if is_set {
             command.args([flag, "docs/results"]);

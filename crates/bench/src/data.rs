@@ -1,24 +1,47 @@
 //! The data at hand: which datasets lie in the data folders and what is stored for them.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
 
 use vpr_core::{
-    BestMatches, GroundTruth, Result, Similarities,
+    BestMatches, GroundTruth, Observer, Result, Similarities,
     dataset::{
-        DataRoots, Dataset, DatasetEntry, Layout, Manifest,
+        DataRoots, Dataset, DatasetEntry, Manifest,
         layout::vpr_bench::{GroundTruthFile, PublishedMatches},
     },
     metrics::Timing,
     table::Provenance,
 };
 
-use crate::technique::Technique;
+use crate::technique::{Network, Technique, networks};
 
-/// The manifest and the folders it is resolved in.
-#[derive(Clone, Debug)]
+/// The manifest, the folders it is resolved in, and what was computed from them so far.
+///
+/// Experiments that run in one process share opened datasets and score matrices; nothing of that
+/// outlives the process.
+#[derive(Debug)]
 pub struct Data {
     manifest: Manifest,
     roots: DataRoots,
+    cache: PathBuf,
+    datasets: Mutex<BTreeMap<String, Option<Arc<Dataset>>>>,
+    scores: Mutex<BTreeMap<ScoreKey, Arc<Scores>>>,
+    networks: Mutex<Option<Vec<(&'static str, Network)>>>,
+}
+
+/// Which scores: first query, technique with its settings, and whether the sides are exchanged.
+pub(crate) type ScoreKey = (String, String, bool);
+
+/// What a technique found on a dataset.
+#[derive(Clone, Debug)]
+pub(crate) struct Scores {
+    /// Similarity of every query with every reference.
+    pub(crate) similarities: Similarities,
+    /// What is to be said of them.
+    pub(crate) note: Option<String>,
 }
 
 /// Matches that the authors stored, with the ground truth they are judged by.
@@ -37,11 +60,18 @@ pub struct Stored {
 }
 
 impl Data {
-    /// The built-in manifest over `data` (what the user names) and the workspace's own `data`.
+    /// The built-in manifest over `data` (what the user names) and the workspace's own `data`;
+    /// generated worlds are kept in `cache`.
     #[must_use]
-    pub fn new(data: &Path, workspace_data: &Path) -> Self {
-        let roots = DataRoots::new([data.to_owned(), workspace_data.to_owned()]);
-        Self { manifest: Manifest::builtin(), roots }
+    pub fn new(data: &Path, workspace_data: &Path, cache: &Path) -> Self {
+        Self {
+            manifest: Manifest::builtin(),
+            roots: DataRoots::new([data.to_owned(), workspace_data.to_owned()]),
+            cache: cache.to_owned(),
+            datasets: Mutex::default(),
+            scores: Mutex::default(),
+            networks: Mutex::default(),
+        }
     }
 
     /// All datasets the manifest knows.
@@ -49,13 +79,16 @@ impl Data {
         self.manifest.datasets.iter()
     }
 
-    /// The manifest's entry.
+    /// The manifest's entry, or that of a generated world, `world/<name>`.
     ///
     /// # Errors
     ///
     /// [`vpr_core::Error::Unknown`] with the names there are.
-    pub fn entry(&self, id: &str) -> Result<&DatasetEntry> {
-        self.manifest.find(id)
+    pub fn entry(&self, id: &str) -> Result<DatasetEntry> {
+        if vpr_worlds::is_world(id) {
+            return vpr_worlds::entry(id);
+        }
+        self.manifest.find(id).cloned()
     }
 
     /// Where a path of the manifest lies, if it is at hand.
@@ -70,6 +103,9 @@ impl Data {
     ///
     /// If the file is there but cannot be read.
     pub fn ground_truth(&self, id: &str) -> Result<Option<GroundTruthFile>> {
+        if vpr_worlds::is_world(id) {
+            return Ok(None);
+        }
         let path = self.entry(id)?.path.join("ground_truth_new.npy");
         self.find(path).map(|path| GroundTruthFile::read(&path)).transpose()
     }
@@ -92,20 +128,45 @@ impl Data {
         Ok(Some(Stored { similarities: matches.similarities, best, timing, truth, n_clamped }))
     }
 
-    /// The images of a dataset with their truth, if at hand.
+    /// The images of a dataset with their truth, if at hand; a generated world always is.
     ///
     /// # Errors
     ///
-    /// If the folders are there but something in them is wrong.
-    pub fn images(&self, id: &str) -> Result<Option<Dataset>> {
-        let entry = self.entry(id)?;
-        let folder = match entry.layout {
-            Layout::VprBench | Layout::ImagePairs => "query",
-            Layout::UtmNames => "queries",
-            Layout::Npz | Layout::SevenScenes | Layout::InvarianceScores => return Ok(None),
-        };
-        let at_hand = self.find(entry.path.join(folder)).is_some();
-        at_hand.then(|| Dataset::open(entry, &self.roots)).transpose()
+    /// As [`vpr_worlds::open_named`].
+    pub fn images(&self, id: &str, observer: &dyn Observer) -> Result<Option<Arc<Dataset>>> {
+        if let Some(dataset) = lock(&self.datasets).get(id) {
+            return Ok(dataset.clone());
+        }
+        let dataset = vpr_worlds::open_named(id, &self.roots, &self.cache, observer)?.map(Arc::new);
+        lock(&self.datasets).insert(id.to_owned(), dataset.clone());
+        Ok(dataset)
+    }
+
+    /// The networks whose weights are at hand, each with the name of its column; opened once.
+    ///
+    /// # Errors
+    ///
+    /// If weights are there but are not those of the network.
+    pub fn networks(&self) -> Result<Vec<(&'static str, Network)>> {
+        let mut opened = lock(&self.networks);
+        if let Some(opened) = &*opened {
+            return Ok(opened.clone());
+        }
+        Ok(opened.insert(networks(&self.roots.roots)?).clone())
+    }
+
+    /// Scores that an experiment of this process has computed already, or those `compute` gives.
+    pub(crate) fn scores(
+        &self,
+        key: ScoreKey,
+        compute: impl FnOnce() -> Result<Scores>,
+    ) -> Result<Arc<Scores>> {
+        if let Some(scores) = lock(&self.scores).get(&key) {
+            return Ok(Arc::clone(scores));
+        }
+        let scores = Arc::new(compute()?);
+        lock(&self.scores).insert(key, Arc::clone(&scores));
+        Ok(scores)
     }
 
     /// Where numbers from the images of a dataset come from.
@@ -114,8 +175,7 @@ impl Data {
     ///
     /// [`vpr_core::Error::Unknown`].
     pub fn provenance(&self, id: &str) -> Result<Provenance> {
-        let is_generated = self.entry(id)?.path.starts_with("fixture");
-        Ok(if is_generated { Provenance::Generated } else { Provenance::Measured })
+        Ok(self.entry(id)?.provenance())
     }
 
     /// One line that says what is missing and where to get it.
@@ -127,4 +187,9 @@ impl Data {
         let entry = self.entry(id)?;
         Ok(format!("{}: no {what} at hand; origin: {}", entry.name, entry.origin))
     }
+}
+
+/// What a thread that panicked left behind is whole: entries are inserted at once.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -19,7 +19,23 @@ fn workspace() -> PathBuf {
 fn bench(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
     command.current_dir(workspace()).args(arguments).env_remove("VPR_DATA");
+    command.env("VPR_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("worlds"));
     command
+}
+
+/// A generated corridor of eight places, small enough for a test.
+const WORLD: &str = "world/corridor?places=8&camera.width=80&camera.height=60&camera.focal=55.0";
+
+/// An experiment of the workspace on these datasets only, in `dir`.
+fn on_datasets(dir: &Path, id: &str, datasets: &[&str]) -> String {
+    let text = fs::read_to_string(workspace().join(format!("experiments/{id}.toml"))).unwrap();
+    let lines = text.lines().map(|line| match line.strip_prefix("datasets = ") {
+        Some(_) => format!("datasets = {datasets:?}"),
+        None => line.to_owned(),
+    });
+    let path = dir.join(format!("{id}.toml"));
+    fs::write(&path, lines.collect::<Vec<_>>().join("\n") + "\n").unwrap();
+    path.to_str().unwrap().to_owned()
 }
 
 fn run(arguments: &[&str]) -> Output {
@@ -63,7 +79,9 @@ fn techniques_are_listed() {
 
 #[test]
 fn a_fresh_clone_computes_generated_cells_and_says_what_is_absent() {
-    let output = run(&["run", "experiments/table-3.5.toml", "--format", "json"]);
+    let dir = tempfile::tempdir().unwrap();
+    let path = on_datasets(dir.path(), "table-3.5", &["spedtest", "fixture", WORLD]);
+    let output = run(&["run", &path, "--format", "json"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let table: Value = serde_json::from_str(&stdout(&output)).expect("JSON");
     assert_eq!(table["id"], "table-3.5");
@@ -71,20 +89,31 @@ fn a_fresh_clone_computes_generated_cells_and_says_what_is_absent() {
     let of = |provenance: &str| {
         cells.iter().filter(|it| it["provenance"] == provenance).cloned().collect::<Vec<_>>()
     };
-    assert_eq!(of("generated").len(), 6, "two definitions of three techniques");
+    let of_hand = of("generated")
+        .iter()
+        .filter(|it| it["column"].as_str().is_some_and(|column| column.contains("HOG")))
+        .count();
+    assert_eq!(of_hand, 12, "two definitions of three techniques on two datasets");
     assert_eq!(of("published").len() + of("measured").len(), 0);
     let absent = of("absent");
     assert!(absent.iter().all(|it| it["value"].is_null()));
-    assert!(
-        absent.iter().all(|it| it["note"].as_str().is_some_and(|note| note.contains("origin")))
-    );
+    // The other rows of the thesis are of datasets that this experiment leaves out.
+    let named: Vec<_> = absent.iter().filter(|it| it["row"] == "SPEDTest").collect();
+    assert_eq!(named.len(), 10, "one per technique");
+    assert!(named.iter().all(|it| it["note"].as_str().is_some_and(|note| note.contains("origin"))));
     let keys: Vec<&String> = cells[0].as_object().expect("a cell").keys().collect();
     assert_eq!(keys, ["column", "definition", "n", "note", "provenance", "row", "thesis", "value"]);
 }
 
 #[test]
 fn the_same_command_gives_the_same_bytes_for_any_number_of_threads() {
-    for experiment in ["experiments/table-3.5.toml", "experiments/figure-3.19.toml"] {
+    let dir = tempfile::tempdir().unwrap();
+    let table = on_datasets(dir.path(), "table-3.5", &["fixture", WORLD]);
+    let figure = dir.path().join("figure-3.19.toml");
+    let text = fs::read_to_string(workspace().join("experiments/figure-3.19.toml")).unwrap();
+    let (before, stages) = text.split_once("stages = [").unwrap();
+    fs::write(&figure, before.to_owned() + stages.split_once("\n]\n").unwrap().1).unwrap();
+    for experiment in [table.as_str(), figure.to_str().unwrap()] {
         let with = |threads: &str| {
             let mut command = bench(&["run", experiment, "--format", "csv"]);
             command.env("RAYON_NUM_THREADS", threads).output().expect("the program starts").stdout
@@ -100,12 +129,12 @@ fn the_same_command_gives_the_same_bytes_for_any_number_of_threads() {
 #[test]
 fn a_number_that_is_off_exits_with_1() {
     let dir = tempfile::tempdir().unwrap();
-    let text = fs::read_to_string(workspace().join("experiments/table-3.5.toml")).unwrap();
+    let path = on_datasets(dir.path(), "table-3.5", &["fixture"]);
+    let text = fs::read_to_string(&path).unwrap();
     let wrong = "\n[[expect]]\ndefinition = \"published\"\nprovenance = \"generated\"\ntolerance = 1e-6\n\
                  [expect.grid]\ncolumns = [\"HOG\"]\nrows = [{ name = \"Generated fixture\", values = [0.123] }]\n";
-    let path = dir.path().join("table-3.5.toml");
     fs::write(&path, text + wrong).unwrap();
-    let output = run(&["run", path.to_str().unwrap(), "--check", "docs/results"]);
+    let output = run(&["run", &path, "--check", "docs/results"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     assert!(stderr(&output).contains("expected 0.123"), "{}", stderr(&output));
 }
@@ -236,7 +265,9 @@ fn copy_places(to: &Path) {
 /// Runs a study on places of the user's own, laid out where the manifest looks for Corridor.
 fn study_of(places: &Path) -> Output {
     let data = places.ancestors().nth(3).unwrap().to_str().unwrap().to_owned();
-    run(&["run", "experiments/figure-3.11.toml", "--data", &data])
+    let dir = tempfile::tempdir().unwrap();
+    let path = on_datasets(dir.path(), "figure-3.11", &["corridor"]);
+    run(&["run", &path, "--data", &data])
 }
 
 #[test]
@@ -338,4 +369,37 @@ fn a_misspelled_experiment_is_refused_by_line() {
     let path = dir.path().join("table-3.5.toml");
     fs::write(&path, "id = \"table-3.5\"\ntitel = \"x\"\n").unwrap();
     assert_refused(&run(&["run", path.to_str().unwrap()]), &["table-3.5.toml", "line 2", "titel"]);
+}
+
+#[test]
+fn several_experiments_run_in_one_process_and_the_worst_code_counts() {
+    let dir = tempfile::tempdir().unwrap();
+    let first = on_datasets(dir.path(), "table-3.1", &["fixture", WORLD]);
+    let second = on_datasets(dir.path(), "figure-3.11", &["fixture", WORLD]);
+    let output = run(&["run", &first, &second, "--format", "csv"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let alone =
+        [run(&["run", &first, "--format", "csv"]), run(&["run", &second, "--format", "csv"])];
+    assert_eq!(stdout(&output), stdout(&alone[0]) + &stdout(&alone[1]));
+    let pages = dir.path().join("pages");
+    let pages = pages.to_str().unwrap();
+    assert_eq!(run(&["run", &first, "--write", pages]).status.code(), Some(0));
+    let check = run(&["run", &first, &second, "--check", pages]);
+    assert_eq!(check.status.code(), Some(1), "the second has no page: {}", stderr(&check));
+}
+
+#[test]
+fn generated_places_go_by_name_wherever_a_dataset_does() {
+    let recall = run(&["evaluate", "--dataset", WORLD, "--recall-values", "1", "8"]);
+    assert_eq!(recall.status.code(), Some(0), "{}", stderr(&recall));
+    assert!(stdout(&recall).ends_with("R@8: 100.0\n"), "{}", stdout(&recall));
+    let small = "places=3&camera.width=32&camera.height=24";
+    for layout in ["vpr-bench", "utm", "seven-scenes"] {
+        let name = format!("world/street?{small}&layout=\"{layout}\"");
+        let output = run(&["validate", &name]);
+        assert_eq!(output.status.code(), Some(0), "{layout}: {}", stdout(&output));
+    }
+    assert_refused(&run(&["evaluate", "--dataset", "world/strete"]), &["strete", "known: street,"]);
+    assert_refused(&run(&["evaluate", "--dataset", "spedtest"]), &["SPEDTest", "origin"]);
+    assert_refused(&run(&["validate", "world/street?places=0"]), &["places"]);
 }

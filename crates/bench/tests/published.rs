@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use bench::{
     data::{Data, Stored},
     evaluate::{Evaluation, Positives},
-    technique::{HandCrafted, Technique},
+    technique::{Describe as _, HandCrafted, Technique},
 };
 use vpr_core::{
     Definition, Similarities,
@@ -40,7 +40,7 @@ fn data() -> Option<Data> {
         println!("skipped: VPR_DATA is not set");
         return None;
     };
-    Some(Data::new(Path::new(&folder), &workspace().join("data")))
+    Some(Data::new(Path::new(&folder), &workspace().join("data"), &workspace().join("data/worlds")))
 }
 
 /// One line of the oracle: dataset id, technique, values by column name.
@@ -138,7 +138,7 @@ fn areas_between_the_published_curves_are_the_stored_ones() {
 /// Our scores of a technique on Corridor's images, and the stored ones.
 fn corridor(data: &Data, technique: Technique, ours: &HandCrafted) -> (Similarities, Stored) {
     let stored = data.stored("corridor", technique).unwrap().expect("published matches at hand");
-    let images = data.images("corridor").unwrap().expect("images at hand");
+    let images = data.images("corridor", &()).unwrap().expect("images at hand");
     let queries = ours.encode(&images.queries, &|| ()).unwrap();
     let references = ours.encode(&images.references, &|| ()).unwrap();
     (queries.match_with(&references).unwrap().similarities, stored)

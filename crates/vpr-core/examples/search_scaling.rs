@@ -169,6 +169,7 @@ impl Sweep {
             x_label: format!("{}, log10", self.quantity),
             y_label: "milliseconds, log10".to_owned(),
             curves: (0..self.times.len()).map(curve).collect(),
+            is_scatter: false,
         }
     }
 }

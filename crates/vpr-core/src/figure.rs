@@ -20,6 +20,8 @@ pub struct Panel {
     pub y_label: String,
     /// The curves.
     pub curves: Vec<Curve>,
+    /// Whether the points are drawn apart instead of joined.
+    pub is_scatter: bool,
 }
 
 /// One curve: points joined in order.
@@ -99,6 +101,14 @@ mod svg {
             .draw()?;
         for (curve, colour) in panel.curves.iter().zip(COLOURS.iter().cycle()) {
             let style = colour.stroke_width(2);
+            if panel.is_scatter {
+                let dot = move |point| Circle::new(point, 2, colour.mix(0.7).filled());
+                chart
+                    .draw_series(curve.points.iter().copied().map(dot))?
+                    .label(&curve.name)
+                    .legend(move |(x, y)| Circle::new((x + 7, y), 3, colour.filled()));
+                continue;
+            }
             chart
                 .draw_series(LineSeries::new(curve.points.iter().copied(), style))?
                 .label(&curve.name)
@@ -146,11 +156,21 @@ mod svg {
                 x_label: "recall".into(),
                 y_label: "precision".into(),
                 curves: vec![curve("HOG"), curve("CoHOG")],
+                is_scatter: false,
             };
             let svg = Figure { panels: vec![panel.clone(), panel] }.svg().unwrap();
             for text in ["Corridor", "recall", "precision", "HOG", "CoHOG"] {
                 assert_eq!(svg.matches(&format!("\n{text}\n")).count(), 2, "{text}");
             }
+        }
+
+        #[test]
+        fn scattered_points_are_drawn_one_by_one() {
+            let points = vec![(0.0, 1.0), (1.0, 0.5), (2.0, 0.7)];
+            let curves = vec![Curve { name: "Corridor".into(), points }];
+            let panel = Panel { curves, is_scatter: true, ..Panel::default() };
+            let svg = Figure { panels: vec![panel] }.svg().unwrap();
+            assert_eq!(svg.matches("<circle").count(), 4, "three points and the legend");
         }
 
         #[test]

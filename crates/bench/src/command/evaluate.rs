@@ -3,10 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use bench::{study::Observer, technique::HandCrafted};
+use bench::{
+    data::Data,
+    technique::{Describe as _, HandCrafted},
+};
 use vpr_core::{
-    Descriptors, GroundTruth, Poses, Ranking,
-    cli::{self, DataArgs, Outcome},
+    Descriptors, GroundTruth, Observer as _, Poses, Ranking,
+    cli::{self, Bar, DataArgs, Outcome},
     dataset::layout::{
         pose_csv::PoseTable,
         utm_names::UtmFolder,
@@ -21,13 +24,19 @@ use vpr_vision::{cohog::CoHogParams, hog::HogParams};
 use super::{
     encoder::EncoderArgs,
     predictions::{self, Named},
-    run::Bar,
 };
 
 /// The flags of VPR-methods-evaluation, in kebab case; the names with underscores work too.
 #[derive(clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "one per flag")]
 pub(crate) struct EvaluateArgs {
+    /// A dataset by name, such as `corridor` or the generated `world/street`, with its own truth
+    #[arg(
+        long,
+        value_name = "NAME",
+        conflicts_with_all = ["database_folder", "database_descriptors", "ground_truth"]
+    )]
+    dataset: Option<String>,
     /// Folder of the reference images, with `@utm_east@utm_north@…` names
     #[arg(long, alias = "database_folder", value_name = "DIR", requires = "queries_folder")]
     pub(super) database_folder: Option<PathBuf>,
@@ -115,6 +124,8 @@ pub(super) struct Retrieved {
     confidence: Vec<f64>,
     /// Query and reference vectors, for techniques that have one per image.
     pub(super) descriptors: Option<(Descriptors, Descriptors)>,
+    /// The truth that came with the images.
+    pub(super) truth: Option<GroundTruth>,
 }
 
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
@@ -124,11 +135,16 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     ensure!(args.recall_values.iter().all(|&n| n > 0), "`recall-values` 0: recall@0 is no metric");
     let largest = args.recall_values.iter().copied().max().unwrap_or(1);
     let k = largest.max(args.num_preds_to_save);
-    let retrieved = match (&args.database_folder, &args.queries_folder) {
-        (Some(references), Some(queries)) => from_folders(args, queries, references, k)?,
+    let retrieved = match (&args.dataset, &args.database_folder, &args.queries_folder) {
+        (Some(id), _, _) => from_dataset(args, id, k)?,
+        (_, Some(references), Some(queries)) => from_folders(args, queries, references, k)?,
         _ => from_descriptors(args, k)?,
     };
-    let truth = if args.no_labels { None } else { Some(truth(args, &retrieved)?) };
+    let truth = match &retrieved.truth {
+        _ if args.no_labels => None,
+        Some(truth) => Some(truth.clone()),
+        None => Some(truth(args, &retrieved)?),
+    };
     if let Some(truth) = &truth {
         let entries = args.recall_values.iter().map(|&n| {
             let recall = recall_at(n, &retrieved.ranking, truth)?;
@@ -165,6 +181,30 @@ fn from_folders(
     let needs_positions = !args.no_labels && args.ground_truth.is_none();
     let queries = Named::folder(queries, needs_positions)?;
     let references = Named::folder(references, needs_positions)?;
+    match_images(args, queries, references, k)
+}
+
+/// Describes and matches the images of a dataset.
+fn from_dataset(args: &EvaluateArgs, id: &str, k: usize) -> anyhow::Result<Retrieved> {
+    let data = Data::new(&args.data.data, Path::new("data"), &args.data.cache);
+    let dataset = data.images(id, &Bar::default())?;
+    let Some(dataset) = dataset else { bail!(data.why_absent(id, "images")?) };
+    let (query_poses, reference_poses) = dataset.poses.clone().unzip();
+    let named =
+        |names: &[PathBuf], poses| Named { names: names.to_vec(), poses, zone: String::new() };
+    let queries = named(&dataset.queries, query_poses);
+    let references = named(&dataset.references, reference_poses);
+    let retrieved = match_images(args, queries, references, k)?;
+    Ok(Retrieved { truth: Some(dataset.truth.clone()), ..retrieved })
+}
+
+/// Describes and matches two sets of images by the method asked for.
+fn match_images(
+    args: &EvaluateArgs,
+    queries: Named,
+    references: Named,
+    k: usize,
+) -> anyhow::Result<Retrieved> {
     let Some(technique) = hand_crafted(&args.method) else {
         return by_network(args, queries, references, k);
     };
@@ -179,10 +219,10 @@ fn from_folders(
     let ranking = matched.similarities.ranked(k)?;
     let descriptors = query_features.into_descriptors().zip(reference_features.into_descriptors());
     let confidence = matched.similarities.best().confidence;
-    Ok(Retrieved { queries, references, ranking, confidence, descriptors })
+    Ok(Retrieved { queries, references, ranking, confidence, descriptors, truth: None })
 }
 
-/// Describes the images of two folders by a network and retrieves by Euclidean distance.
+/// Describes images by a network and retrieves by Euclidean distance.
 fn by_network(
     args: &EvaluateArgs,
     queries: Named,
@@ -222,7 +262,7 @@ fn nearest(
         (0..retrieval.len()).map(|query| -f64::from(retrieval.distances(query)[0])).collect();
     let ranking = AsRef::<Ranking>::as_ref(&retrieval).clone();
     let descriptors = Some((query_rows, reference_rows));
-    Ok(Retrieved { queries, references, ranking, confidence, descriptors })
+    Ok(Retrieved { queries, references, ranking, confidence, descriptors, truth: None })
 }
 
 /// Retrieves from two files of descriptors by Euclidean distance.
@@ -230,7 +270,7 @@ fn from_descriptors(args: &EvaluateArgs, k: usize) -> anyhow::Result<Retrieved> 
     let (Some(references), Some(queries)) = (&args.database_descriptors, &args.queries_descriptors)
     else {
         bail!(
-            "give --database-folder and --queries-folder, or --database-descriptors and --queries-descriptors"
+            "give --dataset, --database-folder and --queries-folder, or --database-descriptors and --queries-descriptors"
         );
     };
     let read = |path: &PathBuf| -> anyhow::Result<Descriptors> {

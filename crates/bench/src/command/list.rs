@@ -32,7 +32,9 @@ enum What {
 pub(crate) fn run(args: &ListArgs) -> anyhow::Result<Outcome> {
     let lines = match args.what {
         What::Techniques => techniques(),
-        What::Datasets => datasets(&Data::new(&args.data.data, Path::new("data"))),
+        What::Datasets => {
+            datasets(&Data::new(&args.data.data, Path::new("data"), &args.data.cache))
+        }
         What::Metrics => metrics(),
     };
     cli::print(&(lines.join("\n") + "\n"))?;
@@ -63,6 +65,11 @@ fn datasets(data: &Data) -> Vec<String> {
             count(entry.references),
             entry.name,
         ));
+    }
+    for world in vpr_worlds::names() {
+        let id = format!("world/{world}");
+        let origin = data.entry(&id).map_or_else(|err| err.to_string(), |entry| entry.origin);
+        lines.push(format!("{id:<34}{origin}"));
     }
     lines
 }

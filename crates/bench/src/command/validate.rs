@@ -2,8 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
+use bench::data::Data;
 use vpr_core::{
-    cli::{self, Outcome},
+    cli::{self, Bar, DataArgs, Outcome},
     dataset::{Severity, validate},
 };
 use vpr_vision::image;
@@ -11,17 +13,18 @@ use vpr_vision::image;
 /// Which folder to look at.
 #[derive(clap::Args)]
 pub(crate) struct ValidateArgs {
-    /// Dataset folder: `query/`, `ref/`, `ground_truth_new.npy`, or `queries/`, `database/`
+    /// Dataset folder: `query/`, `ref/`, `ground_truth_new.npy`, or `queries/`, `database/`, or
+    /// `seq-01/`; or the name of a generated one, such as `world/street`
     folder: PathBuf,
+    #[command(flatten)]
+    data: DataArgs,
     /// Decode every image whole, not only its header
     #[arg(long)]
     thorough: bool,
 }
 
 pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<Outcome> {
-    if !args.folder.is_dir() {
-        anyhow::bail!("{}: is not a folder", args.folder.display());
-    }
+    let folder = folder(args)?;
     let probe = |path: &Path| {
         let size = if args.thorough {
             image::decode(path).map(|image| image.size())
@@ -32,13 +35,28 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<Outcome> {
         let length = |pixels: usize| u32::try_from(pixels).map_err(|err| err.to_string());
         Ok((length(size.width)?, length(size.height)?))
     };
-    let problems = validate(&args.folder, &probe);
+    let problems = validate(&folder, &probe);
     for problem in &problems {
         cli::print(&format!("{problem}\n"))?;
     }
     let n_errors = problems.iter().filter(|it| it.severity == Severity::Error).count();
     cli::note(&format!("{n_errors} errors, {} warnings", problems.len() - n_errors));
     Ok(if n_errors == 0 { Outcome::Success } else { Outcome::Mismatch })
+}
+
+/// The folder itself, or that of the generated world of this name, rendered if need be.
+fn folder(args: &ValidateArgs) -> anyhow::Result<PathBuf> {
+    if args.folder.is_dir() {
+        return Ok(args.folder.clone());
+    }
+    let name = args.folder.to_str().filter(|name| vpr_worlds::is_world(name));
+    let Some(name) = name else {
+        anyhow::bail!("{}: is not a folder", args.folder.display());
+    };
+    let data = Data::new(&args.data.data, Path::new("data"), &args.data.cache);
+    let dataset = data.images(name, &Bar::default())?.context("a world has images")?;
+    let image = dataset.queries.first().context("a world has queries")?;
+    Ok(image.ancestors().nth(2).unwrap_or(image).to_owned())
 }
 
 /// What is wrong, without the path that the problem names already.

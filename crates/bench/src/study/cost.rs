@@ -8,7 +8,7 @@ use vpr_core::{
 };
 use vpr_vision::{cohog::CoHogParams, hog::HogParams};
 
-use super::{Context, subject::hand_crafted};
+use super::{Context, subject::runners};
 use crate::technique::Technique;
 
 /// The descriptor of a technique that does not run here, as the thesis states it.
@@ -30,7 +30,7 @@ const TIMED: usize = 40;
 
 pub(super) fn run(
     table: &mut Table,
-    timed_on: &str,
+    timed_on: &[String],
     stored: &[String],
     descriptors: &[DescriptorShape],
     context: Context<'_>,
@@ -42,11 +42,11 @@ pub(super) fn run(
 }
 
 /// Times measured here, each apart from the other; only on request, since they vary.
-fn times(table: &mut Table, timed_on: &str, context: Context<'_>) -> Result<()> {
+fn times(table: &mut Table, timed_on: &[String], context: Context<'_>) -> Result<()> {
     networks(table);
-    for (column, technique) in hand_crafted() {
-        let images = context.data.images(timed_on)?.filter(|_| context.timings);
-        let Some(images) = images else {
+    let images = if context.timings { context.first_images(timed_on)? } else { None };
+    for (column, technique) in runners(context)? {
+        let Some(images) = &images else {
             for row in [ENCODING, MATCHING] {
                 table.push(Cell::absent(row, column, "measured on request: --timings"));
             }
@@ -54,7 +54,7 @@ fn times(table: &mut Table, timed_on: &str, context: Context<'_>) -> Result<()> 
         };
         let paths = &images.queries[..images.queries.len().min(TIMED)];
         let timing = technique.time(paths)?;
-        let provenance = context.data.provenance(timed_on)?;
+        let provenance = images.provenance;
         let note = format!("median on one thread of this machine, {} images", images.name);
         for (row, value) in [(ENCODING, timing.encoding), (MATCHING, timing.matching * 1e3)] {
             let cell = Cell::new(row, column, value, provenance, paths.len());

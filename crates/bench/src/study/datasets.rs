@@ -19,10 +19,10 @@ pub(super) fn run(
 ) -> Result<Option<Figure>> {
     for id in datasets {
         let row = context.data.entry(id)?.name.clone();
-        let images = context.data.images(id)?;
+        let images = context.images(id)?;
         let provenance = context.data.provenance(id)?;
         let why = context.data.why_absent(id, "images")?;
-        if let Some(images) = &images {
+        if let Some(images) = images.as_deref() {
             for (column, paths) in
                 [("Queries", &images.queries), ("References", &images.references)]
             {

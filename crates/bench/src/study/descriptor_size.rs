@@ -12,7 +12,7 @@ use super::{
     Context,
     subject::{Subject, match_images, value_cell},
 };
-use crate::technique::HandCrafted;
+use crate::technique::{Describe as _, HandCrafted};
 
 /// What is swept.
 pub(super) struct Sweep<'a> {
@@ -56,7 +56,7 @@ pub(super) fn run(
         let name = context.data.entry(id)?.name.clone();
         for &cell in sweep.cell_sizes {
             let row = format!("{cell}x{cell}, {name}");
-            let Some(dataset) = context.data.images(id)? else {
+            let Some(dataset) = context.images(id)? else {
                 for (column, _) in at_cell_size(cell) {
                     let why = context.data.why_absent(id, "images")?;
                     table.push(Cell::absent(&row, format!("{column} AUC"), why));
@@ -105,15 +105,15 @@ fn measure(
     dataset: &Dataset,
     context: Context<'_>,
 ) -> Result<()> {
-    let (similarities, note) = match_images(technique, column, dataset, false, context)?;
+    let scores = match_images(technique, column, dataset, false, context)?;
     let subject = Subject {
         row: row.to_owned(),
         column,
-        provenance: context.data.provenance(&dataset.id)?,
-        best: similarities.best(),
-        similarities,
+        provenance: dataset.provenance,
+        best: scores.similarities.best(),
+        similarities: scores.similarities.clone(),
         truth: dataset.truth.clone(),
-        note,
+        note: scores.note.clone(),
     };
     let evaluation = subject.evaluation()?;
     for definition in [Definition::Published, Definition::Corrected] {

@@ -2,16 +2,20 @@
 
 use std::{collections::BTreeMap, path::PathBuf};
 
+use serde::Deserialize;
 use vpr_core::{
-    Definition, Result,
+    Definition, Result, Similarities,
     dataset::layout::vpr_bench::{image_folder, read_curves},
     figure::{Curve, Figure, Panel},
     metrics::area_between_curves,
     table::{Cell, Provenance, Table},
 };
 
-use super::{Context, subject::hand_crafted};
-use crate::technique::{HandCrafted, Technique};
+use super::{
+    Context,
+    subject::{match_images, runners},
+};
+use crate::technique::{Describe, Technique};
 
 /// The kinds of variation and the files of their stored curves: same place, other place.
 const VARIATIONS: [(&str, &str, &str); 2] = [
@@ -33,39 +37,101 @@ struct Curves {
     other: Vec<f64>,
 }
 
+/// Images of one place varied and of another place varied alike, on one stage.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stage {
+    /// What varies.
+    pub variation: String,
+    /// Dataset whose one reference is the key frame; the first half of the queries shows its place,
+    /// the second half another.
+    pub dataset: String,
+}
+
+/// Where the curves come from.
+pub(super) struct Sources<'a> {
+    /// Dataset with stored curves.
+    pub(super) stored: Option<&'a str>,
+    /// Datasets with folders of image series.
+    pub(super) series: &'a [String],
+    /// Datasets that are one stage each.
+    pub(super) stages: &'a [Stage],
+}
+
 pub(super) fn run(
     table: &mut Table,
-    stored: &str,
-    series: &[String],
+    sources: &Sources<'_>,
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
     let mut figure = Figure::default();
     for (variation, same, other) in VARIATIONS {
-        let folder = context.data.entry(stored)?.path.clone();
-        let files = (context.data.find(folder.join(same)), context.data.find(folder.join(other)));
-        if let (Some(same), Some(other)) = files {
-            let (same, other) = (read_curves(&same)?, read_curves(&other)?);
-            for (technique, curves) in paired(&same, &other) {
-                report(
-                    table,
-                    &mut figure,
-                    technique.name(),
-                    variation,
-                    &curves,
-                    Provenance::Published,
-                )?;
-            }
-        } else {
-            for technique in &Technique::ALL[..8] {
-                let why = context.data.why_absent(stored, "stored curves")?;
-                table.push(Cell::absent(technique.name(), format!("{variation} ABC"), why));
-            }
+        if let Some(stored) = sources.stored {
+            let files = (same, other);
+            published(table, &mut figure, stored, (variation, files), context)?;
         }
-        for id in series {
+        for id in sources.series {
             measure(table, &mut figure, id, variation, context)?;
         }
     }
+    for stage in sources.stages {
+        on_stage(table, &mut figure, stage, context)?;
+    }
     Ok(Some(figure))
+}
+
+/// The curves that the authors stored.
+fn published(
+    table: &mut Table,
+    figure: &mut Figure,
+    stored: &str,
+    (variation, (same, other)): (&str, (&str, &str)),
+    context: Context<'_>,
+) -> Result<()> {
+    let folder = context.data.entry(stored)?.path;
+    let files = (context.data.find(folder.join(same)), context.data.find(folder.join(other)));
+    if let (Some(same), Some(other)) = files {
+        let (same, other) = (read_curves(&same)?, read_curves(&other)?);
+        for (technique, curves) in paired(&same, &other) {
+            let name = technique.name();
+            report(table, figure, name, variation, &curves, Provenance::Published)?;
+        }
+        return Ok(());
+    }
+    for technique in &Technique::ALL[..8] {
+        let why = context.data.why_absent(stored, "stored curves")?;
+        table.push(Cell::absent(technique.name(), format!("{variation} ABC"), why));
+    }
+    Ok(())
+}
+
+/// Runs the techniques on a stage.
+fn on_stage(
+    table: &mut Table,
+    figure: &mut Figure,
+    stage: &Stage,
+    context: Context<'_>,
+) -> Result<()> {
+    let variation = stage.variation.as_str();
+    let Some(dataset) = context.images(&stage.dataset)? else {
+        let why = context.data.why_absent(&stage.dataset, "images")?;
+        let row = context.data.entry(&stage.dataset)?.name;
+        table.push(Cell::absent(row, format!("{variation} ABC"), why));
+        return Ok(());
+    };
+    for (column, technique) in runners(context)? {
+        let scores = match_images(technique.as_ref(), column, &dataset, true, context)?;
+        let curves = halves(&scores.similarities);
+        let row = format!("{column}, {}", dataset.name);
+        report(table, figure, &row, variation, &curves, dataset.provenance)?;
+    }
+    Ok(())
+}
+
+/// The scores of the key frame with all variations, those of its own place and of the other.
+fn halves(similarities: &Similarities) -> Curves {
+    let scores = similarities.view().row(0).to_vec();
+    let (same, other) = scores.split_at(scores.len() / 2);
+    Curves { same: same.to_vec(), other: other.to_vec() }
 }
 
 /// The techniques that both dictionaries have, in the order of table 3.5.
@@ -100,10 +166,10 @@ fn measure(
         return Ok(());
     };
     let (same, other) = (image_folder(&same)?, image_folder(&other)?);
-    for (column, technique) in hand_crafted() {
+    for (column, technique) in runners(context)? {
         let curves = Curves {
-            same: scores(&technique, &same[..1], &same)?,
-            other: scores(&technique, &same[..1], &other)?,
+            same: scores(technique.as_ref(), &same[..1], &same)?,
+            other: scores(technique.as_ref(), &same[..1], &other)?,
         };
         let row = format!("{column}, {}", entry.name);
         report(table, figure, &row, variation, &curves, context.data.provenance(id)?)?;
@@ -111,7 +177,7 @@ fn measure(
     Ok(())
 }
 
-fn scores(technique: &HandCrafted, key: &[PathBuf], images: &[PathBuf]) -> Result<Vec<f64>> {
+fn scores(technique: &dyn Describe, key: &[PathBuf], images: &[PathBuf]) -> Result<Vec<f64>> {
     let key = technique.encode(key, &|| ())?;
     let images = technique.encode(images, &|| ())?;
     Ok(key.match_with(&images)?.similarities.view().row(0).to_vec())
@@ -148,6 +214,7 @@ fn report(
             Curve { name: "same place".to_owned(), points: points(&curves.same) },
             Curve { name: "other place".to_owned(), points: points(&curves.other) },
         ],
+        is_scatter: false,
     });
     Ok(())
 }

@@ -11,21 +11,28 @@ mod platform_speed;
 mod pr_curves;
 mod range;
 mod recall_curves;
+mod roc;
 mod spacing;
 mod subject;
 mod swap;
 mod tolerances;
 mod verification;
+mod worlds;
+
+use std::sync::Arc;
 
 use serde::Deserialize;
 use vpr_core::{
-    Result,
+    Observer, Result,
+    dataset::Dataset,
     experiment::Experiment,
     figure::{Figure, Panel},
     table::{Provenance, Table},
 };
 
+pub use invariance::Stage;
 pub use platform_speed::TechniqueTiming;
+pub use worlds::{Dial, Domain, Likeness, Worlds};
 
 use crate::data::Data;
 
@@ -54,8 +61,8 @@ pub enum Study {
     },
     /// Times and sizes: table 3.6.
     Cost {
-        /// Dataset whose images are timed.
-        timed_on: String,
+        /// Datasets, of which the first at hand has its images timed.
+        timed_on: Vec<String>,
         /// Datasets with stored times.
         stored: Vec<String>,
         /// Techniques with the shape of their descriptors.
@@ -109,15 +116,28 @@ pub enum Study {
         frames_per_metre: f64,
         /// Fastest platform drawn, in metres per second.
         max_speed: f64,
-        /// Dataset whose images are timed.
-        timed_on: String,
+        /// Datasets, of which the first at hand has its images timed.
+        timed_on: Vec<String>,
     },
     /// Scores under growing variation and the area between the curves: figure 3.19.
     Invariance {
         /// Dataset with the stored curves.
-        stored: String,
+        stored: Option<String>,
         /// Datasets with image series.
+        #[serde(default)]
         series: Vec<String>,
+        /// Datasets that are a stage: one place varied, another varied alike.
+        #[serde(default)]
+        stages: Vec<Stage>,
+    },
+    /// Generated worlds: nuisances, domains, likeness to real places.
+    Worlds(Worlds),
+    /// Finding new places: figure 3.13 with curves, table 3.7 without.
+    Roc {
+        /// Datasets, by id; some of their queries are new places.
+        datasets: Vec<String>,
+        /// Whether to draw the curves and sample them.
+        curves: bool,
     },
     /// Inliers of near and far pairs of images: verification.
     Verification {
@@ -139,23 +159,6 @@ pub struct Report {
     pub figure: Option<Figure>,
 }
 
-/// Told how far long work is.
-pub trait Observer: Sync {
-    /// Work of `n` steps begins.
-    fn start(&self, what: &str, n: usize);
-    /// One step is done.
-    fn step(&self);
-    /// The work has ended.
-    fn end(&self);
-}
-
-/// Listens to nothing.
-impl Observer for () {
-    fn start(&self, _: &str, _: usize) {}
-    fn step(&self) {}
-    fn end(&self) {}
-}
-
 /// What every study is given.
 #[derive(Clone, Copy)]
 pub struct Context<'a> {
@@ -167,6 +170,23 @@ pub struct Context<'a> {
     pub timings: bool,
     /// Seed of the bootstrap.
     pub seed: u64,
+}
+
+impl Context<'_> {
+    /// The first of these datasets that is at hand.
+    fn first_images(&self, ids: &[String]) -> Result<Option<Arc<Dataset>>> {
+        for id in ids {
+            if let Some(dataset) = self.images(id)? {
+                return Ok(Some(dataset));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The images of a dataset, if at hand.
+    fn images(&self, id: &str) -> Result<Option<Arc<Dataset>>> {
+        self.data.images(id, self.observer)
+    }
 }
 
 /// The panel with this title, added if there is none yet.
@@ -226,12 +246,15 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
             };
             platform_speed::run(&mut table, timings, platform, timed_on, context)?
         }
-        Study::Invariance { stored, series } => {
-            invariance::run(&mut table, stored, series, context)?
+        Study::Invariance { stored, series, stages } => {
+            let sources = invariance::Sources { stored: stored.as_deref(), series, stages };
+            invariance::run(&mut table, &sources, context)?
         }
         Study::Verification { dataset, pairs, methods } => {
             verification::run(&mut table, dataset, *pairs, methods, context)?
         }
+        Study::Worlds(worlds) => worlds::run(&mut table, worlds, context)?,
+        Study::Roc { datasets, curves } => roc::run(&mut table, datasets, *curves, context)?,
     };
     experiment.fill_thesis(&mut table);
     Ok(Report { table, figure })

@@ -8,7 +8,7 @@ use vpr_core::{
     table::{Cell, Provenance, Table},
 };
 
-use super::{Context, subject::hand_crafted};
+use super::{Context, subject::runners};
 
 /// The times of one technique, as somebody published them.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -36,7 +36,7 @@ pub(super) fn run(
     table: &mut Table,
     timings: &[TechniqueTiming],
     drive: Drive<'_>,
-    timed_on: &str,
+    timed_on: &[String],
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
     let mut figure = Figure::default();
@@ -49,10 +49,10 @@ pub(super) fn run(
         }
         figure.panels.push(panel(name, timing, &drive)?);
     }
-    for (column, technique) in hand_crafted() {
+    let images = if context.timings { context.first_images(timed_on)? } else { None };
+    for (column, technique) in runners(context)? {
         let row = format!("{column}, this machine");
-        let images = context.data.images(timed_on)?.filter(|_| context.timings);
-        let Some(images) = images else {
+        let Some(images) = &images else {
             for &size in drive.map_sizes {
                 table.push(Cell::absent(
                     &row,
@@ -64,7 +64,7 @@ pub(super) fn run(
         };
         let paths = &images.queries[..images.queries.len().min(TIMED)];
         let timing = technique.time(paths)?;
-        for cell in limits(&row, timing, &drive, context.data.provenance(timed_on)?)? {
+        for cell in limits(&row, timing, &drive, images.provenance)? {
             table.push(cell.timing());
         }
     }
@@ -108,5 +108,6 @@ fn panel(name: &str, timing: Timing, drive: &Drive<'_>) -> Result<Panel> {
         x_label: "platform speed, m/s".to_owned(),
         y_label: "frames per second".to_owned(),
         curves,
+        is_scatter: false,
     })
 }

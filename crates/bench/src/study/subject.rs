@@ -1,5 +1,7 @@
 //! Pairs of dataset and technique for which there are scores, stored or computed here.
 
+use std::sync::Arc;
+
 use vpr_core::{
     BestMatches, Definition, Error, GroundTruth, Result, Similarities,
     dataset::Dataset,
@@ -9,8 +11,9 @@ use vpr_vision::{cohog::CoHogParams, hog::HogParams};
 
 use super::Context;
 use crate::{
+    data::Scores,
     evaluate::Evaluation,
-    technique::{HandCrafted, Technique},
+    technique::{Describe, HandCrafted, Technique},
 };
 
 /// Column of HOG in the thesis' own configuration, which is not the released one (VB-11).
@@ -49,13 +52,20 @@ impl Subject {
     }
 }
 
-/// The techniques run here on every image dataset, and their columns.
-pub(super) fn hand_crafted() -> [(&'static str, HandCrafted); 3] {
-    [
-        ("HOG", HandCrafted::Hog(HogParams::RELEASED)),
-        (HOG_THESIS, HandCrafted::Hog(HogParams::THESIS)),
-        ("CoHOG", HandCrafted::CoHog(CoHogParams::default())),
-    ]
+/// A technique that runs here, and its column.
+pub(super) type Runner = (&'static str, Box<dyn Describe>);
+
+/// The techniques run here on every image dataset; the one place that says which.
+pub(super) fn runners(context: Context<'_>) -> Result<Vec<Runner>> {
+    let mut runners: Vec<Runner> = vec![
+        ("HOG", Box::new(HandCrafted::Hog(HogParams::RELEASED))),
+        (HOG_THESIS, Box::new(HandCrafted::Hog(HogParams::THESIS))),
+        ("CoHOG", Box::new(HandCrafted::CoHog(CoHogParams::default()))),
+    ];
+    for (column, network) in context.data.networks()? {
+        runners.push((column, Box::new(network)));
+    }
+    Ok(runners)
 }
 
 /// All subjects of these datasets; datasets or techniques without data become absent cells.
@@ -68,7 +78,7 @@ pub(super) fn subjects(
     for id in datasets {
         let before = subjects.len();
         subjects.extend(stored(id, context)?);
-        subjects.extend(measured(id, context)?);
+        subjects.extend(computed(id, false, context)?);
         if subjects.len() == before {
             let why = context.data.why_absent(id, "stored matches or images")?;
             let row = &context.data.entry(id)?.name;
@@ -106,55 +116,57 @@ fn clamped(n: usize) -> Option<String> {
     })
 }
 
-/// HOG and `CoHOG`, computed here, if the images are at hand.
-pub(super) fn measured(id: &str, context: Context<'_>) -> Result<Vec<Subject>> {
-    let Some(dataset) = context.data.images(id)? else { return Ok(Vec::new()) };
-    let provenance = context.data.provenance(id)?;
-    let remark = context.data.entry(id)?.note.clone();
-    let subject = |(column, technique): (&'static str, HandCrafted)| {
-        let (similarities, note) = match_images(&technique, column, &dataset, false, context)?;
-        let note = clamped(dataset.n_clamped).or(note).or_else(|| remark.clone());
+/// The techniques that run here, if the images are at hand; both sides exchanged if `swapped`.
+pub(super) fn computed(id: &str, swapped: bool, context: Context<'_>) -> Result<Vec<Subject>> {
+    let Some(dataset) = context.images(id)? else { return Ok(Vec::new()) };
+    let remark = context.data.entry(id)?.note;
+    let truth = if swapped { dataset.truth.swapped() } else { dataset.truth.clone() };
+    let subject = |(column, technique): Runner| {
+        let scores = match_images(technique.as_ref(), column, &dataset, swapped, context)?;
+        let note = clamped(dataset.n_clamped).or(scores.note.clone()).or_else(|| remark.clone());
         Ok(Subject {
             row: dataset.name.clone(),
             column,
-            provenance,
-            best: similarities.best(),
-            similarities,
-            truth: dataset.truth.clone(),
+            provenance: dataset.provenance,
+            best: scores.similarities.best(),
+            similarities: scores.similarities.clone(),
+            truth: truth.clone(),
             note,
         })
     };
-    hand_crafted().into_iter().map(subject).collect()
+    runners(context)?.into_iter().map(subject).collect()
 }
 
 /// Scores of one technique on the images of a dataset, queries and references exchanged if
-/// `swapped`.
+/// `swapped`; computed once per process.
 pub(super) fn match_images(
-    technique: &HandCrafted,
+    technique: &dyn Describe,
     column: &str,
     dataset: &Dataset,
     swapped: bool,
     context: Context<'_>,
-) -> Result<(Similarities, Option<String>)> {
+) -> Result<Arc<Scores>> {
     let (queries, references) = if swapped {
         (&dataset.references, &dataset.queries)
     } else {
         (&dataset.queries, &dataset.references)
     };
-    let n_images = queries.len() + references.len();
-    context.observer.start(&format!("{column} on {}", dataset.name), n_images);
-    let step = || context.observer.step();
-    let queries = technique.encode(queries, &step)?;
-    let references = technique.encode(references, &step)?;
-    context.observer.end();
-    let matched = queries.match_with(&references)?;
-    let note = (matched.n_fallbacks > 0).then(|| {
-        format!(
-            "in {} queries no region passes the entropy threshold: all are used (VB-12)",
-            matched.n_fallbacks
-        )
-    });
-    Ok((matched.similarities, note))
+    // Two names may mean one world; its folder is named by what it was rendered from.
+    let images = queries.first().map_or_else(String::new, |path| path.display().to_string());
+    context.data.scores((images, technique.key(), swapped), || {
+        let n_images = queries.len() + references.len();
+        context.observer.start(&format!("{column} on {}", dataset.name), n_images);
+        let step = || context.observer.step();
+        let queries = technique.encode(queries, &step)?;
+        let references = technique.encode(references, &step)?;
+        context.observer.end();
+        let matched = queries.match_with(&references)?;
+        let note = (matched.n_fallbacks > 0).then(|| {
+            let n = matched.n_fallbacks;
+            format!("in {n} queries no region passes the entropy threshold: all are used (VB-12)")
+        });
+        Ok(Scores { similarities: matched.similarities, note })
+    })
 }
 
 /// Pushes a metric under both definitions; a definition without a value becomes a noted cell.

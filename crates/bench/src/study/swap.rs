@@ -8,7 +8,7 @@ use vpr_core::{
 
 use super::{
     Context,
-    subject::{Subject, hand_crafted, match_images, push_both, stored, subjects},
+    subject::{Subject, computed, push_both, stored, subjects},
 };
 use crate::{evaluate::Positives, technique::Technique};
 
@@ -40,6 +40,7 @@ pub(super) fn run(
 fn swapped(table: &mut Table, datasets: &[String], context: Context<'_>) -> Result<Vec<Subject>> {
     let mut subjects = Vec::new();
     for id in datasets {
+        let before = subjects.len();
         for subject in stored(id, context)? {
             let similarities = subject.similarities.swapped();
             let is_symmetric = subject.column != Technique::CoHog.name();
@@ -54,27 +55,13 @@ fn swapped(table: &mut Table, datasets: &[String], context: Context<'_>) -> Resu
                 ..subject
             });
         }
-        let Some(dataset) = context.data.images(id)? else {
-            if subjects.is_empty() {
-                let row = format!("{}, swapped", context.data.entry(id)?.name);
-                let why = context.data.why_absent(id, "stored matches or images")?;
-                for technique in Technique::ALL {
-                    table.push(Cell::absent(&row, technique.name(), &why));
-                }
+        subjects.extend(computed(id, true, context)?);
+        if subjects.len() == before {
+            let row = format!("{}, swapped", context.data.entry(id)?.name);
+            let why = context.data.why_absent(id, "stored matches or images")?;
+            for technique in Technique::ALL {
+                table.push(Cell::absent(&row, technique.name(), &why));
             }
-            continue;
-        };
-        for (column, technique) in hand_crafted() {
-            let (similarities, note) = match_images(&technique, column, &dataset, true, context)?;
-            subjects.push(Subject {
-                row: dataset.name.clone(),
-                column,
-                provenance: context.data.provenance(id)?,
-                best: similarities.best(),
-                similarities,
-                truth: dataset.truth.swapped(),
-                note,
-            });
         }
     }
     Ok(subjects)

@@ -1,7 +1,7 @@
 //! Tolerances that the published ground truths really have: table 3.2.
 
 use vpr_core::{
-    Result,
+    GroundTruth, Result,
     dataset::{Tolerance, layout::vpr_bench::GroundTruthFile},
     figure::Figure,
     table::{Cell, Provenance, Table},
@@ -18,7 +18,11 @@ pub(super) fn run(
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
     for id in datasets {
-        let row = context.data.entry(id)?.name.clone();
+        let row = context.data.entry(id)?.name;
+        if vpr_worlds::is_world(id) {
+            generated(table, &row, id, context)?;
+            continue;
+        }
         let Some(file) = context.data.ground_truth(id)? else {
             table.push(Cell::absent(row, COLUMN, context.data.why_absent(id, "ground truth")?));
             continue;
@@ -34,14 +38,44 @@ pub(super) fn run(
             let cell = Cell::new(&row, COLUMN, text.as_str(), provenance, n);
             table.push(if remark.is_empty() { cell } else { cell.noted(remark) });
         }
-        let lists = file.lists.iter().filter(|list| list.as_slice() != [-1]);
-        let counts: Vec<usize> = lists.map(Vec::len).collect();
-        let most = counts.iter().copied().max().unwrap_or(0) as f64;
-        let fewest = counts.iter().copied().min().unwrap_or(0) as f64;
-        table.push(Cell::new(&row, "fewest correct references", fewest, provenance, n));
-        table.push(Cell::new(&row, "most correct references", most, provenance, n));
+        count(table, &row, &file.lists, provenance);
     }
     Ok(None)
+}
+
+/// How many references are correct at least and at most, new places aside.
+fn count(table: &mut Table, row: &str, lists: &[Vec<i64>], provenance: Provenance) {
+    let known = lists.iter().filter(|list| list.as_slice() != [-1]);
+    let counts: Vec<usize> = known.map(Vec::len).collect();
+    let most = counts.iter().copied().max().unwrap_or(0) as f64;
+    let fewest = counts.iter().copied().min().unwrap_or(0) as f64;
+    table.push(Cell::new(row, "fewest correct references", fewest, provenance, lists.len()));
+    table.push(Cell::new(row, "most correct references", most, provenance, lists.len()));
+}
+
+/// The tolerance of a generated world: the lists of one in frames; of one in metres, whether its
+/// truth follows from the positions, which real lists come without.
+fn generated(table: &mut Table, row: &str, id: &str, context: Context<'_>) -> Result<()> {
+    let Some(dataset) = context.images(id)? else { return Ok(()) };
+    let (truth, provenance) = (&dataset.truth, dataset.provenance);
+    let lists: Vec<Vec<i64>> = (0..truth.len())
+        .map(|query| match truth.correct(query) {
+            [] => vec![-1],
+            some => some.iter().filter_map(|&reference| i64::try_from(reference).ok()).collect(),
+        })
+        .collect();
+    let (text, remark) = match (context.data.entry(id)?.tolerance, &dataset.poses) {
+        (Tolerance::Metres(radius), Some((queries, references))) => {
+            let follows = GroundTruth::within_radius(queries, references, radius)? == *truth;
+            let remark = if follows { "" } else { "its lists do not follow from the positions" };
+            (format!("± {radius} meters"), remark)
+        }
+        _ => describe(&GroundTruthFile { path: id.into(), lists: lists.clone() }),
+    };
+    let cell = Cell::new(row, COLUMN, text.as_str(), provenance, truth.len());
+    table.push(if remark.is_empty() { cell } else { cell.noted(remark) });
+    count(table, row, &lists, provenance);
+    Ok(())
 }
 
 /// What the lists of a ground truth amount to, in the thesis' words where they fit, and a remark.

@@ -23,13 +23,34 @@ pub enum HandCrafted {
     CoHog(CoHogParams),
 }
 
+/// A technique that runs here on image files.
+pub trait Describe: Send + Sync {
+    /// Its name and all of its settings: two techniques with the same key give the same numbers.
+    fn key(&self) -> String;
+
+    /// Describes images, in order; `step` is called after each.
+    ///
+    /// # Errors
+    ///
+    /// The first image, in order, that cannot be read or decoded, by its path.
+    fn encode(&self, images: &[PathBuf], step: &(dyn Fn() + Sync)) -> Result<Features>;
+
+    /// Seconds to encode one of these images and to compare one pair of them, on one thread,
+    /// each apart from the other: the median over the images, decoding left out.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::encode`]; [`vpr_core::Error::Empty`] without images.
+    fn time(&self, images: &[PathBuf]) -> Result<Timing>;
+}
+
 /// The descriptors of a set of images.
 #[derive(Clone, Debug)]
 pub enum Features {
-    /// One vector per image.
-    Hog(Descriptors),
+    /// One vector per image, compared by cosine.
+    Vectors(Descriptors),
     /// A set of regions per image.
-    CoHog(Vec<CoHogDescriptor>),
+    Regions(Vec<CoHogDescriptor>),
 }
 
 /// What a technique found on a pair of image sets.
@@ -43,36 +64,29 @@ pub struct Matched {
     pub n_fallbacks: usize,
 }
 
-impl HandCrafted {
-    /// Describes images, in order; `step` is called after each.
-    ///
-    /// # Errors
-    ///
-    /// The first image, in order, that cannot be read or decoded, by its path.
-    pub fn encode(&self, images: &[PathBuf], step: &(dyn Fn() + Sync)) -> Result<Features> {
+impl Describe for HandCrafted {
+    fn key(&self) -> String {
+        format!("{self:?}")
+    }
+
+    fn encode(&self, images: &[PathBuf], step: &(dyn Fn() + Sync)) -> Result<Features> {
         match self {
             Self::Hog(params) => {
                 let hog = Hog::new(*params)?;
                 let rows = each(images, step, |path| hog.describe(&image::decode(path)?))?;
                 let shape = (images.len(), params.dim());
                 let rows = Array2::from_shape_fn(shape, |(row, column)| rows[row][column]);
-                Descriptors::new(rows).map(Features::Hog)
+                Descriptors::new(rows).map(Features::Vectors)
             }
             Self::CoHog(params) => {
                 let cohog = CoHog::new(params.clone())?;
                 let describe = |path: &Path| cohog.describe(&image::decode(path)?);
-                each(images, step, describe).map(Features::CoHog)
+                each(images, step, describe).map(Features::Regions)
             }
         }
     }
 
-    /// Seconds to encode one of these images and to compare one pair of them, on one thread,
-    /// each apart from the other: the median over the images, decoding left out.
-    ///
-    /// # Errors
-    ///
-    /// As [`Self::encode`]; [`vpr_core::Error::Empty`] without images.
-    pub fn time(&self, images: &[PathBuf]) -> Result<Timing> {
+    fn time(&self, images: &[PathBuf]) -> Result<Timing> {
         let decoded = images.iter().map(|path| image::decode(path)).collect::<Result<Vec<_>>>()?;
         let mut encoding = Vec::new();
         let mut matching = Vec::new();
@@ -99,8 +113,8 @@ impl Features {
     #[must_use]
     pub fn len(&self) -> usize {
         match self {
-            Self::Hog(descriptors) => descriptors.len(),
-            Self::CoHog(descriptors) => descriptors.len(),
+            Self::Vectors(descriptors) => descriptors.len(),
+            Self::Regions(descriptors) => descriptors.len(),
         }
     }
 
@@ -114,8 +128,8 @@ impl Features {
     #[must_use]
     pub fn into_descriptors(self) -> Option<Descriptors> {
         match self {
-            Self::Hog(descriptors) => Some(descriptors),
-            Self::CoHog(_) => None,
+            Self::Vectors(descriptors) => Some(descriptors),
+            Self::Regions(_) => None,
         }
     }
 
@@ -127,12 +141,12 @@ impl Features {
     /// [`vpr_core::Error::Empty`] if there are none.
     pub fn match_with(&self, references: &Self) -> Result<Matched> {
         match (self, references) {
-            (Self::Hog(queries), Self::Hog(references)) => Ok(Matched {
+            (Self::Vectors(queries), Self::Vectors(references)) => Ok(Matched {
                 similarities: hog::similarities(queries, references)?,
                 descriptor_bytes: references.dim() * size_of::<f32>(),
                 n_fallbacks: 0,
             }),
-            (Self::CoHog(queries), Self::CoHog(references)) => {
+            (Self::Regions(queries), Self::Regions(references)) => {
                 let first = references.first().ok_or(vpr_core::Error::Empty("references"))?;
                 Ok(Matched {
                     similarities: cohog::similarities(queries, references)?,
@@ -181,7 +195,7 @@ fn timed<I, T>(
     items.iter().map(run).collect()
 }
 
-fn median(values: &mut [f64]) -> Result<f64> {
+pub(super) fn median(values: &mut [f64]) -> Result<f64> {
     if values.is_empty() {
         return Err(vpr_core::Error::Empty("images to time"));
     }

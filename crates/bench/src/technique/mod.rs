@@ -1,10 +1,12 @@
 //! The techniques of chapter 3: what they are called and which run here.
 
 mod hand_crafted;
+mod network;
 
 use serde::{Deserialize, Serialize};
 
-pub use hand_crafted::{Features, HandCrafted, Matched};
+pub use hand_crafted::{Describe, Features, HandCrafted, Matched};
+pub use network::{Network, networks};
 
 /// One of the ten techniques of the thesis.
 ///

@@ -1,0 +1,66 @@
+//! The domain gap: recall@1 on different kinds of places at equal viewpoint change.
+
+use serde::Deserialize;
+use vpr_core::{
+    Result,
+    metrics::bootstrap::Interval,
+    table::{Cell, Provenance, Table},
+};
+
+use super::{super::Context, recall, techniques};
+
+/// A kind of place.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Domain {
+    /// What the page calls it.
+    pub name: String,
+    /// World of that kind.
+    pub world: String,
+}
+
+pub(super) fn run(table: &mut Table, domains: &[Domain], context: Context<'_>) -> Result<()> {
+    for runner in techniques(context)? {
+        let mut home: Option<Interval> = None;
+        for domain in domains {
+            let row = format!("domain: {}", domain.name);
+            let Some(here) = recall(table, &row, &domain.world, &runner, context)? else {
+                continue;
+            };
+            let Some(home) = &home else {
+                home = Some(here);
+                continue;
+            };
+            let (gap, low, high) = difference(home, &here);
+            let row = format!("domain gap: {} minus {}", domains[0].name, domain.name);
+            let cell = Cell::new(row, runner.0, gap, Provenance::Generated, 2);
+            table.push(cell.within(low, high, "Newcombe"));
+        }
+    }
+    Ok(())
+}
+
+/// The difference of two independent shares with its interval (Newcombe 1998, method 10).
+fn difference(first: &Interval, second: &Interval) -> (f64, f64, f64) {
+    let gap = first.estimate - second.estimate;
+    let below = (first.estimate - first.low).hypot(second.high - second.estimate);
+    let above = (first.high - first.estimate).hypot(second.estimate - second.low);
+    (gap, gap - below, gap + above)
+}
+
+#[cfg(test)]
+mod tests {
+    use vpr_core::metrics::bootstrap::{Z_95, wilson_interval};
+
+    use super::*;
+
+    #[test]
+    fn the_difference_of_shares_has_newcombes_interval() {
+        // Newcombe 1998, table II, case (a): 56/70 against 48/80.
+        let first = wilson_interval(56, 70, Z_95).unwrap();
+        let second = wilson_interval(48, 80, Z_95).unwrap();
+        let (gap, low, high) = difference(&first, &second);
+        assert!((gap - 0.2).abs() < 1e-12);
+        assert!((low - 0.0524).abs() < 5e-5 && (high - 0.3339).abs() < 5e-5, "{low} {high}");
+    }
+}

@@ -1,0 +1,82 @@
+//! What generated worlds do to techniques, and how far they are from real places: the page
+//! `docs/results/worlds.md`.
+
+mod dial;
+mod gap;
+mod light_stage;
+mod likeness;
+
+use serde::Deserialize;
+use vpr_core::{
+    Result,
+    figure::Figure,
+    metrics::bootstrap::{Interval, Z_95, wilson_interval},
+    table::{Cell, Table},
+};
+
+pub use dial::Dial;
+pub use gap::Domain;
+pub use likeness::Likeness;
+
+use super::{
+    Context,
+    subject::{HOG_THESIS, Runner, match_images, runners},
+};
+use crate::evaluate::Evaluation;
+
+/// The parts of the page.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Worlds {
+    /// Nuisances that are turned up one at a time.
+    pub dials: Vec<Dial>,
+    /// World of one key frame under many lights.
+    pub light_stage: String,
+    /// Domains at equal viewpoint change; the first is the one others are compared with.
+    pub domains: Vec<Domain>,
+    /// Real and generated sets to be told apart.
+    pub likeness: Likeness,
+}
+
+pub(super) fn run(
+    table: &mut Table,
+    worlds: &Worlds,
+    context: Context<'_>,
+) -> Result<Option<Figure>> {
+    let mut figure = Figure::default();
+    for dial in &worlds.dials {
+        dial::run(table, &mut figure, dial, context)?;
+    }
+    light_stage::run(table, &mut figure, &worlds.light_stage, context)?;
+    gap::run(table, &worlds.domains, context)?;
+    likeness::run(table, &mut figure, &worlds.likeness, context)?;
+    Ok(Some(figure))
+}
+
+/// One configuration of each technique.
+fn techniques(context: Context<'_>) -> Result<impl Iterator<Item = Runner>> {
+    Ok(runners(context)?.into_iter().filter(|(column, _)| *column != HOG_THESIS))
+}
+
+/// Recall@1 of a technique on a generated dataset, of the queries that have a correct reference,
+/// with Wilson's interval; pushed as a cell.
+fn recall(
+    table: &mut Table,
+    row: &str,
+    id: &str,
+    (column, technique): &Runner,
+    context: Context<'_>,
+) -> Result<Option<Interval>> {
+    let Some(dataset) = context.images(id)? else {
+        table.push(Cell::absent(row, *column, context.data.why_absent(id, "images")?));
+        return Ok(None);
+    };
+    let scores = match_images(technique.as_ref(), column, &dataset, false, context)?;
+    let evaluation = Evaluation::new(&scores.similarities, &dataset.truth)?;
+    let n_hits = evaluation.correct().iter().filter(|&&is_correct| is_correct).count();
+    let n = dataset.truth.n_known();
+    let interval = wilson_interval(n_hits, n, Z_95)?;
+    let cell = Cell::new(row, *column, interval.estimate, dataset.provenance, n);
+    table.push(cell.within(interval.low, interval.high, "Wilson"));
+    Ok(Some(interval))
+}
