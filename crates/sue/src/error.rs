@@ -11,6 +11,9 @@ pub enum Error {
     /// Wrong descriptors, poses, files or parameters.
     #[error(transparent)]
     Core(#[from] vpr_core::Error),
+    /// Weights or networks.
+    #[error(transparent)]
+    Nets(#[from] vpr_nets::Error),
     /// An estimator needs more neighbours than were retrieved or than there are.
     #[error("{estimator} needs {needed} neighbours per query, but only {available} are ranked")]
     TooFewNeighbors {

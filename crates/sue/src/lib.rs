@@ -26,12 +26,14 @@
 
 pub mod calibrate;
 mod choice;
+pub mod corpus;
 mod decision;
 mod error;
 mod estimator;
 pub mod evaluate;
 mod evidence;
 pub mod fusion;
+pub mod study;
 
 pub use choice::{EstimatorChoice, EstimatorSettings, Prepared};
 pub use decision::Threshold;

@@ -23,6 +23,8 @@ enum Command {
     Evaluate(Box<command::evaluate::EvaluateArgs>),
     /// Choose a threshold that keeps a promise, from queries whose correct references are known
     Calibrate(Box<command::calibrate::CalibrateArgs>),
+    /// Run an experiment file and compare it with the numbers of the thesis
+    Run(command::run::RunArgs),
 }
 
 fn main() -> ExitCode {
@@ -30,5 +32,6 @@ fn main() -> ExitCode {
         Command::Estimate(args) => command::estimate::run(&args),
         Command::Evaluate(args) => command::evaluate::run(&args),
         Command::Calibrate(args) => command::calibrate::run(&args),
+        Command::Run(args) => command::run::run(&args),
     })
 }

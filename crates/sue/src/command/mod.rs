@@ -4,4 +4,5 @@ pub(crate) mod calibrate;
 pub(crate) mod estimate;
 pub(crate) mod evaluate;
 mod input;
+pub(crate) mod run;
 mod truth;

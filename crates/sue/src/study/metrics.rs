@@ -1,0 +1,38 @@
+//! All metrics of all estimators.
+
+use vpr_core::table::{Cell, Table};
+
+use super::{
+    Context,
+    subject::{Subject, open},
+};
+use crate::{Result, evaluate::Evaluation};
+
+pub(super) fn run(table: &mut Table, subjects: &[Subject], context: Context<'_>) -> Result<()> {
+    for (opened, verify) in open(table, subjects, "AUC-ROC", context)? {
+        for scored in opened.score_all(&verify, context)? {
+            let Ok(uncertainty) = &scored.uncertainty else { continue };
+            let summary = Evaluation::new(uncertainty, &opened.corpus.judged)?.summary()?;
+            let row = format!("{}: {}", opened.row, scored.name);
+            let values = [
+                ("base rate", Some(summary.base_rate)),
+                ("AUC-PR, published", summary.auc_pr_published),
+                ("AUC-PR, corrected", summary.auc_pr_corrected),
+                ("AUC-ROC", summary.auc_roc),
+                ("AURC", Some(summary.aurc)),
+                ("excess AURC", Some(summary.excess_aurc)),
+                ("R@95%P", summary.recall_at_95_precision),
+            ];
+            for (column, value) in values {
+                let cell = opened.cell(&row, column, 0.0);
+                table.push(match value {
+                    Some(value) => Cell { value: Some(value.into()), ..cell },
+                    None => {
+                        Cell { value: None, ..cell.noted("undefined: all or no match is correct") }
+                    }
+                });
+            }
+        }
+    }
+    Ok(())
+}

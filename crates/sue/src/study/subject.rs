@@ -1,0 +1,191 @@
+//! Datasets under encoders, and the uncertainties of their matches.
+
+use serde::Deserialize;
+use vpr_core::{
+    Definition,
+    metrics::bootstrap::Resampling,
+    table::{Cell, Provenance, Table},
+};
+
+use super::Context;
+use crate::{
+    Error, EstimatorChoice, EstimatorSettings, InlierCounts, Inliers, Result, UncertaintyEstimator,
+    corpus::{self, COUNTERPARTS, Corpus, LocalMethod, Verified, inlier_counts},
+    evaluate::Evaluation,
+};
+
+/// One dataset, the encoders that see it, and how its matches are verified.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Subject {
+    /// Id of the manifest, `world/…`, or the name of a counterpart.
+    pub dataset: String,
+    /// `hog`, `cohog`, `published`, or an encoder by name.
+    pub encoders: Vec<String>,
+    /// Local methods for geometric verification; what takes long is left to few.
+    #[serde(default)]
+    pub verify: Vec<LocalMethod>,
+}
+
+/// One corpus with its row label.
+pub(super) struct Opened {
+    /// Row label.
+    pub(super) row: String,
+    pub(super) corpus: Corpus,
+}
+
+/// The uncertainties of one method, or why it has none.
+pub(super) struct Scored {
+    /// Column label.
+    pub(super) name: &'static str,
+    pub(super) uncertainty: Result<Vec<f64>, String>,
+}
+
+/// Opens all subjects; what is not at hand becomes an absent cell in `column`.
+pub(super) fn open(
+    table: &mut Table,
+    subjects: &[Subject],
+    column: &str,
+    context: Context<'_>,
+) -> Result<Vec<(Opened, Vec<LocalMethod>)>> {
+    let mut all = Vec::new();
+    for subject in subjects {
+        let opened = corpus::open(&subject.dataset, &subject.encoders, &context.sources)?;
+        let is_alone = subject.encoders.len() == 1;
+        for corpus in opened.corpora {
+            let is_counterpart = COUNTERPARTS.iter().any(|it| it.name == subject.dataset);
+            let row = if is_counterpart && is_alone { corpus.name.clone() } else { corpus.label() };
+            all.push((Opened { row, corpus }, subject.verify.clone()));
+        }
+        for why in opened.missing {
+            table.push(Cell::absent(&subject.dataset, column, why));
+        }
+    }
+    Ok(all)
+}
+
+/// Opens one subject with one encoder.
+pub(super) fn open_one(
+    table: &mut Table,
+    subject: &Subject,
+    column: &str,
+    context: Context<'_>,
+) -> Result<Option<Opened>> {
+    let mut all = open(table, std::slice::from_ref(subject), column, context)?;
+    all.truncate(1);
+    Ok(all.pop().map(|it| it.0))
+}
+
+/// The estimators of table 5.2 that need no images, in its order, and those it has not.
+pub(super) const EFFICIENT: [EstimatorChoice; 8] = [
+    EstimatorChoice::L2,
+    EstimatorChoice::Pa,
+    EstimatorChoice::Sue,
+    EstimatorChoice::SuePublished,
+    EstimatorChoice::SueThesis,
+    EstimatorChoice::SimilarityDistribution,
+    EstimatorChoice::RatioSpread,
+    EstimatorChoice::StatisticalUncertainty,
+];
+
+impl Opened {
+    /// The uncertainties of these estimators with the thesis' settings.
+    pub(super) fn score(&self, choices: &[EstimatorChoice]) -> Result<Vec<Scored>> {
+        let settings = EstimatorSettings::default();
+        choices.iter().map(|&choice| self.score_one(choice, &settings)).collect()
+    }
+
+    /// The uncertainties of one estimator.
+    pub(super) fn score_one(
+        &self,
+        choice: EstimatorChoice,
+        settings: &EstimatorSettings,
+    ) -> Result<Scored> {
+        let prepared = choice.prepare(settings, Some(&self.corpus.poses))?;
+        let uncertainty = match prepared.estimate(&self.corpus.retrieval) {
+            Ok(values) => Ok(values),
+            Err(
+                err @ (Error::Underflow { .. }
+                | Error::NoDensity { .. }
+                | Error::TooFewNeighbors { .. }),
+            ) => Err(err.to_string()),
+            Err(err) => return Err(err),
+        };
+        Ok(Scored { name: prepared.name(), uncertainty })
+    }
+
+    /// The negative inliers of a local method.
+    pub(super) fn verify(&self, method: LocalMethod, context: Context<'_>) -> Result<Scored> {
+        let name = method.name();
+        let uncertainty = match inlier_counts(&self.corpus, method, &context.sources)? {
+            Verified::Counts(counts) => {
+                Ok(Inliers::named(name).estimate(&InlierCounts::new(&counts)?)?)
+            }
+            Verified::NotAtHand(why) => Err(why),
+        };
+        Ok(Scored { name, uncertainty })
+    }
+
+    /// Everything about this corpus: efficient estimators, then verification.
+    pub(super) fn score_all(
+        &self,
+        verify: &[LocalMethod],
+        context: Context<'_>,
+    ) -> Result<Vec<Scored>> {
+        let mut scored = self.score(&EFFICIENT)?;
+        for &method in verify {
+            scored.push(self.verify(method, context)?);
+        }
+        Ok(scored)
+    }
+
+    /// A cell about this corpus.
+    pub(super) fn cell(&self, row: &str, column: &str, value: f64) -> Cell {
+        Cell::new(row, column, value, self.corpus.provenance, self.corpus.judged.len())
+    }
+
+    /// AUC-PR under both definitions with its interval; `remark` is a footnote.
+    pub(super) fn push_auc(
+        &self,
+        table: &mut Table,
+        (row, column): (&str, &str),
+        scored: &Scored,
+        remark: Option<&str>,
+        resampling: &Resampling,
+    ) -> Result<()> {
+        for definition in [Definition::Published, Definition::Corrected] {
+            let empty = |why: &str| {
+                let cell = self.cell(row, column, 0.0).noted(why);
+                Cell { value: None, ..cell }.defined(definition)
+            };
+            let uncertainty = match &scored.uncertainty {
+                Ok(uncertainty) => uncertainty,
+                Err(why) => {
+                    table.push(empty(why));
+                    continue;
+                }
+            };
+            let evaluation = Evaluation::new(uncertainty, &self.corpus.judged)?;
+            table.push(match evaluation.auc_pr_interval(definition, resampling) {
+                Ok(it) => {
+                    let cell = self.cell(row, column, it.estimate).defined(definition);
+                    let cell = match remark {
+                        Some(remark) => cell.noted(remark),
+                        None => cell,
+                    };
+                    cell.within(it.low, it.high, "bootstrap over queries")
+                }
+                Err(Error::Core(err @ vpr_core::Error::Undefined { .. })) => {
+                    empty(&err.to_string())
+                }
+                Err(err) => return Err(err),
+            });
+        }
+        Ok(())
+    }
+
+    /// Whether the data is real.
+    pub(super) fn is_real(&self) -> bool {
+        self.corpus.provenance != Provenance::Generated
+    }
+}

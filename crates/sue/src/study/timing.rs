@@ -1,0 +1,39 @@
+//! Seconds per query, apart from retrieval.
+
+use std::time::{Duration, Instant};
+
+use super::subject::Opened;
+use crate::{EstimatorChoice, EstimatorSettings, Result, corpus::Verifier};
+
+/// How long an estimator is repeated at least.
+const WINDOW: Duration = Duration::from_millis(50);
+/// Pairs that are verified.
+const PAIRS: usize = 5;
+
+/// Milliseconds per query of an estimator on one thread, the batch being the whole corpus.
+pub(super) fn efficient(opened: &Opened, choice: EstimatorChoice) -> Result<f64> {
+    let settings = EstimatorSettings::default();
+    let prepared = choice.prepare(&settings, Some(&opened.corpus.poses))?;
+    let (start, mut rounds) = (Instant::now(), 0_u32);
+    while start.elapsed() < WINDOW {
+        std::hint::black_box(prepared.estimate(&opened.corpus.retrieval)?);
+        rounds += 1;
+    }
+    let queries = f64::from(rounds) * opened.corpus.judged.len() as f64;
+    Ok(1e3 * start.elapsed().as_secs_f64() / queries)
+}
+
+/// Milliseconds to verify one pair on one thread, features of both images included; the median of
+/// a few. `None` without images.
+pub(super) fn verification(opened: &Opened, verifier: &Verifier) -> Result<Option<f64>> {
+    let Some((queries, references)) = &opened.corpus.images else { return Ok(None) };
+    let best = opened.corpus.retrieval.best();
+    let mut times = Vec::new();
+    for (query, &reference) in queries.iter().zip(&best).take(PAIRS) {
+        let start = Instant::now();
+        verifier.verify(&verifier.detect(query)?, &verifier.detect(&references[reference])?)?;
+        times.push(1e3 * start.elapsed().as_secs_f64());
+    }
+    times.sort_unstable_by(f64::total_cmp);
+    Ok(times.get(times.len() / 2).copied())
+}
