@@ -8,23 +8,16 @@ use bench::{
     technique::{Describe as _, HandCrafted},
 };
 use vpr_core::{
-    Descriptors, GroundTruth, Observer as _, Poses, Ranking,
+    Descriptors, GroundTruth, Observer as _, Ranking,
     cli::{self, Bar, DataArgs, Outcome},
-    dataset::layout::{
-        pose_csv::PoseTable,
-        utm_names::UtmFolder,
-        vpr_bench::{GroundTruthFile, image_folder},
-    },
+    dataset::layout::vpr_bench::GroundTruthFile,
     metrics::{Positives, auc_pr, recall_at},
     npy, retrieve,
 };
-use vpr_nets::encode::encode_files;
+use vpr_nets::encode::{Encoder, Options, encode_files};
 use vpr_vision::{cohog::CoHogParams, hog::HogParams};
 
-use super::{
-    encoder::EncoderArgs,
-    predictions::{self, Named},
-};
+use super::{encoder::EncoderArgs, named::Named, predictions};
 
 /// The flags of VPR-methods-evaluation, in kebab case; the names with underscores work too.
 #[derive(clap::Args)]
@@ -120,6 +113,8 @@ pub(super) struct Retrieved {
     pub(super) queries: Named,
     pub(super) references: Named,
     pub(super) ranking: Ranking,
+    /// The ranking by descriptors of single images, for networks whose descriptors depend on the batch.
+    alone: Option<Ranking>,
     /// How sure the best match of each query is; higher is surer.
     confidence: Vec<f64>,
     /// Query and reference vectors, for techniques that have one per image.
@@ -146,18 +141,25 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         None => Some(truth(args, &retrieved)?),
     };
     if let Some(truth) = &truth {
-        let entries = args.recall_values.iter().map(|&n| {
-            let recall = recall_at(n, &retrieved.ranking, truth)?;
-            Ok(format!("R@{n}: {:.1}", 100.0 * recall))
-        });
-        let entries: Vec<String> = entries.collect::<vpr_core::Result<_>>()?;
-        cli::print(&format!("{}\n", entries.join(", ")))?;
+        cli::print(&format!("{}\n", recalls(args, &retrieved.ranking, truth)?))?;
+        if let Some(alone) = &retrieved.alone {
+            cli::print(&format!("{} (images one by one)\n", recalls(args, alone, truth)?))?;
+        }
         if args.auc_pr {
             print_auc_pr(&retrieved, truth)?;
         }
     }
     predictions::save(args, &retrieved, truth.as_ref())?;
     Ok(Outcome::Success)
+}
+
+/// `R@1: 98.8, R@5: 99.7, …`
+fn recalls(args: &EvaluateArgs, ranking: &Ranking, truth: &GroundTruth) -> anyhow::Result<String> {
+    let entries = args.recall_values.iter().map(|&n| {
+        let recall = recall_at(n, ranking, truth)?;
+        Ok(format!("R@{n}: {:.1}", 100.0 * recall))
+    });
+    Ok(entries.collect::<vpr_core::Result<Vec<String>>>()?.join(", "))
 }
 
 /// Prints AUC-PR in both definitions.
@@ -219,7 +221,15 @@ fn match_images(
     let ranking = matched.similarities.ranked(k)?;
     let descriptors = query_features.into_descriptors().zip(reference_features.into_descriptors());
     let confidence = matched.similarities.best().confidence;
-    Ok(Retrieved { queries, references, ranking, confidence, descriptors, truth: None })
+    Ok(Retrieved {
+        queries,
+        references,
+        ranking,
+        alone: None,
+        confidence,
+        descriptors,
+        truth: None,
+    })
 }
 
 /// Describes images by a network and retrieves by Euclidean distance.
@@ -231,22 +241,39 @@ fn by_network(
 ) -> anyhow::Result<Retrieved> {
     let encoder = args.encoder.open(&args.method, &args.data.data)?;
     let options = args.encoder.options(args.num_workers, false);
-    if encoder.batch_dependent() && options.batch_size > 1 {
+    let [query_rows, reference_rows] = encode(&*encoder, [&queries, &references], &options)?;
+    let alone = if encoder.batch_dependent() && options.batch_size > 1 {
         cli::note(&format!(
-            "warning: descriptors of `{}` depend on their batch; `--batch-size 1` gives those of single images",
+            "descriptors of `{}` depend on their batch: images are described one by one as well",
             encoder.name()
         ));
-    }
-    let bar = cli::progress(encoder.name(), queries.names.len() + references.names.len());
-    let encode = |paths: &[PathBuf], before: usize| {
-        encode_files(&*encoder, paths, &options, &mut |done| {
+        let options = Options { batch_size: 1, ..options };
+        let [query_rows, reference_rows] = encode(&*encoder, [&queries, &references], &options)?;
+        let retrieval = retrieve(&query_rows, &reference_rows, k)?;
+        Some(AsRef::<Ranking>::as_ref(&retrieval).clone())
+    } else {
+        None
+    };
+    let retrieved = nearest(queries, references, query_rows, reference_rows, k)?;
+    Ok(Retrieved { alone, ..retrieved })
+}
+
+/// Descriptors of two sets of images.
+fn encode(
+    encoder: &dyn Encoder,
+    sets: [&Named; 2],
+    options: &Options,
+) -> anyhow::Result<[Descriptors; 2]> {
+    let bar = cli::progress(encoder.name(), sets.iter().map(|set| set.names.len()).sum());
+    let each = |paths: &[PathBuf], before: usize| {
+        encode_files(encoder, paths, options, &mut |done| {
             bar.set_position((before + done) as u64);
         })
     };
-    let query_rows = encode(&queries.names, 0)?;
-    let reference_rows = encode(&references.names, queries.names.len())?;
+    let queries = each(&sets[0].names, 0)?;
+    let references = each(&sets[1].names, sets[0].names.len())?;
     bar.finish_and_clear();
-    nearest(queries, references, query_rows, reference_rows, k)
+    Ok([queries, references])
 }
 
 /// The nearest references by Euclidean distance.
@@ -262,7 +289,15 @@ fn nearest(
         (0..retrieval.len()).map(|query| -f64::from(retrieval.distances(query)[0])).collect();
     let ranking = AsRef::<Ranking>::as_ref(&retrieval).clone();
     let descriptors = Some((query_rows, reference_rows));
-    Ok(Retrieved { queries, references, ranking, confidence, descriptors, truth: None })
+    Ok(Retrieved {
+        queries,
+        references,
+        ranking,
+        alone: None,
+        confidence,
+        descriptors,
+        truth: None,
+    })
 }
 
 /// Retrieves from two files of descriptors by Euclidean distance.
@@ -321,40 +356,4 @@ fn truth(args: &EvaluateArgs, retrieved: &Retrieved) -> anyhow::Result<GroundTru
         references.zone
     );
     Ok(GroundTruth::within_radius(query_poses, reference_poses, args.positive_dist_threshold)?)
-}
-
-impl Named {
-    /// Images of a folder: by their `@` names, or in order of their numbers if positions are not
-    /// asked for.
-    fn folder(folder: &Path, needs_positions: bool) -> anyhow::Result<Self> {
-        if !needs_positions {
-            let names =
-                image_folder(folder).or_else(|_| UtmFolder::open(folder).map(|it| it.images))?;
-            return Ok(Self { names, poses: None, zone: String::new() });
-        }
-        let images = UtmFolder::open(folder)?;
-        let poses = Some(images.poses());
-        let zone = images.zones.into_iter().find(|zone| !zone.is_empty()).unwrap_or_default();
-        Ok(Self { names: images.images, poses, zone })
-    }
-
-    /// Rows of a pose table, as many as there are descriptors.
-    fn poses(path: &Path, n: usize) -> anyhow::Result<Self> {
-        let table = PoseTable::read(path)?;
-        ensure!(
-            table.names.len() == n,
-            "{}: {} poses for {n} descriptors",
-            path.display(),
-            table.names.len()
-        );
-        let names = table.names.into_iter().map(PathBuf::from).collect();
-        let poses: Option<Poses> = Some(table.poses);
-        Ok(Self { names, poses, zone: String::new() })
-    }
-
-    /// Rows without names.
-    fn numbered(n: usize) -> Self {
-        let names = (0..n).map(|row| PathBuf::from(row.to_string())).collect();
-        Self { names, poses: None, zone: String::new() }
-    }
 }

@@ -7,6 +7,7 @@ pub(crate) mod list;
 pub(crate) mod map;
 pub(crate) mod match_images;
 pub(crate) mod methods;
+mod named;
 pub(crate) mod predictions;
 pub(crate) mod run;
 pub(crate) mod validate;

@@ -3,17 +3,9 @@
 use std::{fmt::Write as _, fs, path::PathBuf};
 
 use anyhow::Context;
-use vpr_core::{GroundTruth, Poses, cli, npy};
+use vpr_core::{GroundTruth, cli, npy};
 
 use super::evaluate::{EvaluateArgs, Retrieved};
-
-/// Images of one side by name, with their poses if known.
-pub(super) struct Named {
-    pub(super) names: Vec<PathBuf>,
-    pub(super) poses: Option<Poses>,
-    /// UTM zone; empty if the names have none.
-    pub(super) zone: String,
-}
 
 /// Saves predictions and descriptors below `logs/<log_dir>/<time>/`, if any are asked for.
 pub(super) fn save(

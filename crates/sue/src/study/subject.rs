@@ -58,7 +58,11 @@ pub(super) fn open(
             all.push((Opened { row, corpus }, subject.verify.clone()));
         }
         for why in opened.missing {
-            table.push(Cell::absent(&subject.dataset, column, why));
+            let cell = Cell::absent(&subject.dataset, column, why);
+            // A dataset may be listed once per way of verifying it.
+            if !table.cells.contains(&cell) {
+                table.push(cell);
+            }
         }
     }
     Ok(all)

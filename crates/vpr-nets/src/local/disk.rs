@@ -16,11 +16,9 @@ use burn::{
         ops::{AvgPoolOptions, InterpolateMode, InterpolateOptions, PadMode},
     },
 };
-use ndarray::Array2;
 use serde::{Deserialize, Serialize};
-use vpr_core::Descriptors;
 use vpr_vision::{
-    features::{Extractor, LocalDescriptors, LocalFeatures},
+    features::{Extractor, LocalFeatures},
     image::RgbImage,
 };
 
@@ -28,7 +26,7 @@ use super::{
     Detector, check_size, extract,
     map::{FeatureMap, Plane},
     norm::instance_norm,
-    peaks::{maxima, strict_maxima, strongest},
+    peaks::{described, maxima, strict_maxima, strongest},
 };
 use crate::{
     Result,
@@ -247,12 +245,6 @@ impl Disk {
         let peaks = find(plane, window / 2, score_threshold);
         let peaks = strongest(&peaks, features.unwrap_or(peaks.len()));
         let rows = peaks.iter().flat_map(|it| map.at(it.x, it.y).iter().copied()).collect();
-        let rows = Array2::from_shape_vec((peaks.len(), map.channels()), rows);
-        let rows = Descriptors::new(rows.expect("one row per peak"))?.normalized();
-        LocalFeatures::new(
-            peaks.iter().map(|it| [it.x as f32, it.y as f32]).collect(),
-            peaks.iter().map(|it| it.score).collect(),
-            LocalDescriptors::Float(rows),
-        )
+        described(&peaks, rows, map.channels(), [1.0; 2])
     }
 }

@@ -1,5 +1,9 @@
 //! Peaks of a plane of scores.
 
+use ndarray::Array2;
+use vpr_core::{Descriptors, Result};
+use vpr_vision::features::{LocalDescriptors, LocalFeatures};
+
 use super::map::Plane;
 
 /// A pixel that is a peak.
@@ -8,6 +12,26 @@ pub(super) struct Peak {
     pub(super) x: usize,
     pub(super) y: usize,
     pub(super) score: f32,
+}
+
+/// Features of these peaks. `rows` holds `dim` values per peak, which are scaled to unit length;
+/// `scale` takes columns and rows of the plane to pixels of the image.
+///
+/// # Errors
+///
+/// [`vpr_core::Error::NotFinite`] if the network gave NaN.
+pub(super) fn described(
+    peaks: &[Peak],
+    rows: Vec<f32>,
+    dim: usize,
+    scale: [f32; 2],
+) -> Result<LocalFeatures> {
+    let rows = Array2::from_shape_vec((peaks.len(), dim), rows).expect("one row per peak");
+    LocalFeatures::new(
+        peaks.iter().map(|it| [it.x as f32 * scale[0], it.y as f32 * scale[1]]).collect(),
+        peaks.iter().map(|it| it.score).collect(),
+        LocalDescriptors::Float(Descriptors::new(rows)?.normalized()),
+    )
 }
 
 /// Pixels above `threshold` that are the maximum of their window, in raster order. Windows reach `radius` pixels and

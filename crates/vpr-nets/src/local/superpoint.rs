@@ -10,18 +10,16 @@ use burn::{
     nn::{BatchNorm, BatchNormConfig, PaddingConfig2d},
     tensor::{Device, Tensor, activation::relu, module::max_pool2d, ops::MaxPoolOptions},
 };
-use ndarray::Array2;
 use serde::{Deserialize, Serialize};
-use vpr_core::Descriptors;
 use vpr_vision::{
-    features::{Extractor, LocalDescriptors, LocalFeatures},
+    features::{Extractor, LocalFeatures},
     image::RgbImage,
 };
 
 use super::{
     Detector, check_size, extract,
     map::{FeatureMap, Plane, Sampling},
-    peaks::{Peak, by_score, repeated_maxima},
+    peaks::{Peak, by_score, described, repeated_maxima},
     xfeat::{pixels, unit},
 };
 use crate::{
@@ -219,11 +217,5 @@ fn features(peaks: &[Peak], map: &FeatureMap) -> vpr_core::Result<LocalFeatures>
         .iter()
         .flat_map(|peak| map.sample([on_map(peak.x), on_map(peak.y)], Sampling::Bilinear))
         .collect();
-    let rows = Array2::from_shape_vec((peaks.len(), map.channels()), rows);
-    let rows = Descriptors::new(rows.expect("one row per peak"))?.normalized();
-    LocalFeatures::new(
-        peaks.iter().map(|it| [it.x as f32, it.y as f32]).collect(),
-        peaks.iter().map(|it| it.score).collect(),
-        LocalDescriptors::Float(rows),
-    )
+    described(peaks, rows, map.channels(), [1.0; 2])
 }

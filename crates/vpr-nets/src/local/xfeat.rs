@@ -15,11 +15,9 @@ use burn::{
         ops::{AvgPoolOptions, InterpolateMode, InterpolateOptions},
     },
 };
-use ndarray::Array2;
 use serde::{Deserialize, Serialize};
-use vpr_core::Descriptors;
 use vpr_vision::{
-    features::{Extractor, LocalDescriptors, LocalFeatures},
+    features::{Extractor, LocalFeatures},
     image::RgbImage,
 };
 
@@ -27,7 +25,7 @@ use super::{
     Detector, check_size, extract,
     map::{FeatureMap, Plane, Sampling},
     norm::{Standardize, instance_norm},
-    peaks::{Peak, by_score, maxima},
+    peaks::{Peak, by_score, described, maxima},
 };
 use crate::{
     Result,
@@ -353,12 +351,5 @@ fn features(
     let size = map.size();
     let rows =
         peaks.iter().flat_map(|peak| map.sample(position(peak, image, size), Sampling::Bicubic));
-    let rows = Array2::from_shape_vec((peaks.len(), map.channels()), rows.collect());
-    let rows = Descriptors::new(rows.expect("one row per peak"))?.normalized();
-    let place = |peak: &Peak| [peak.x as f32 * scale[0], peak.y as f32 * scale[1]];
-    LocalFeatures::new(
-        peaks.iter().map(place).collect(),
-        peaks.iter().map(|it| it.score).collect(),
-        LocalDescriptors::Float(rows),
-    )
+    described(peaks, rows.collect(), map.channels(), scale)
 }
