@@ -7,6 +7,7 @@ use std::{
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use serde::Deserialize;
 use vpr_core::{
     Pose, Result,
@@ -174,18 +175,20 @@ fn describe(
     needed.sort_unstable();
     needed.dedup();
     context.observer.start(extractor.name(), needed.len());
-    let mut features = BTreeMap::new();
-    for index in needed {
+    let one = |&index: &usize| {
         let mut picture = image::decode(&images[index])?;
         if picture.width() > width {
             let height = (picture.height() * width).div_ceil(picture.width());
             picture = resize_bilinear(&picture, ImageSize { width, height })?;
         }
-        features.insert(index, extractor.extract(&picture)?);
+        let features = extractor.extract(&picture)?;
         context.observer.step();
-    }
+        Ok((index, features))
+    };
+    // Collected before looking for errors: the first of them is then the same in every run.
+    let features: Vec<Result<_>> = needed.par_iter().map(one).collect();
     context.observer.end();
-    Ok(features)
+    features.into_iter().collect()
 }
 
 /// Inliers of a homography for every pair.
@@ -200,7 +203,8 @@ fn count(
         let points = correspondences(a, b, &matches);
         Ok(homography(&points, &RansacParams::HOMOGRAPHY)?.count() as f64)
     };
-    pairs.iter().map(of).collect()
+    let counts: Vec<Result<f64>> = pairs.par_iter().map(of).collect();
+    counts.into_iter().collect()
 }
 
 fn report(table: &mut Table, row: &str, pairs: &[Pair], counts: &[f64], seed: u64) -> Result<()> {
