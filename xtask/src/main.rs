@@ -1,6 +1,7 @@
 //! `cargo xtask`: dispatches to the chapters' programs and computes nothing itself.
 
 mod reproduce;
+mod train;
 
 use std::process::ExitCode;
 
@@ -18,12 +19,17 @@ struct Cli {
 enum Command {
     /// Reproduce tables and figures of the thesis
     Reproduce(reproduce::Args),
+    /// Train a network that comes with the toolkit
+    Train(train::Args),
 }
 
 #[expect(clippy::print_stderr, reason = "a program tells people what went wrong on stderr")]
 fn main() -> ExitCode {
-    let Cli { command: Command::Reproduce(args) } = Cli::parse();
-    match reproduce::run(&args) {
+    let outcome = match Cli::parse().command {
+        Command::Reproduce(args) => reproduce::run(&args),
+        Command::Train(args) => train::run(&args),
+    };
+    match outcome {
         Ok(code) => code,
         Err(err) => {
             eprintln!("error: {err:#}");

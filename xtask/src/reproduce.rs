@@ -110,7 +110,7 @@ fn reproduce(root: &Path, chapter: &str, ids: &[&str], args: &Args) -> anyhow::R
     Ok(status.code().and_then(|code| u8::try_from(code).ok()).map_or(2, |code| code.min(2)))
 }
 
-fn workspace_root() -> anyhow::Result<PathBuf> {
+pub(crate) fn workspace_root() -> anyhow::Result<PathBuf> {
     let manifest = env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from);
     let xtask = manifest.unwrap_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")));
     Ok(xtask.parent().context("xtask lies in the workspace")?.to_owned())

@@ -18,7 +18,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Run an experiment file and compare it with the numbers of the thesis
-    Run(command::run::RunArgs),
+    Run(cli::RunArgs),
     /// Say how many queries find a correct reference, from two folders or two descriptor files
     Evaluate(Box<command::evaluate::EvaluateArgs>),
     /// Describe the images of a folder with a network, and write their map

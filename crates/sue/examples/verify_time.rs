@@ -22,13 +22,15 @@ fn main() -> vpr_core::Result<()> {
         let start = Instant::now();
         let query = sift::detect(&query, &SiftParams::default())?;
         let reference = sift::detect(&reference, &SiftParams::default())?;
-        let detected = start.elapsed();
+        let detect = start.elapsed();
+        let start = Instant::now();
         let matches = match_features(&query, &reference, &MatchParams::RATIO)?;
-        let matched = start.elapsed();
+        let compare = start.elapsed();
+        let start = Instant::now();
         let points = correspondences(&query, &reference, &matches);
         let inliers = homography(&points, &RansacParams::HOMOGRAPHY)?.count();
-        let all = start.elapsed();
-        let stages = [detected, matched - detected, all - matched, all];
+        let verify = start.elapsed();
+        let stages = [detect, compare, verify, detect + compare + verify];
         let [a, b, c, d] = stages.map(|it| 1e3 * it.as_secs_f64());
         println!("{a:.3} {b:.3} {c:.3} {d:.3} {inliers}");
     }

@@ -24,7 +24,7 @@ enum Command {
     /// Choose a threshold that keeps a promise, from queries whose correct references are known
     Calibrate(Box<command::calibrate::CalibrateArgs>),
     /// Run an experiment file and compare it with the numbers of the thesis
-    Run(command::run::RunArgs),
+    Run(cli::RunArgs),
 }
 
 fn main() -> ExitCode {

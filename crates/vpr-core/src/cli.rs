@@ -8,13 +8,14 @@ use std::{
     sync::Mutex,
 };
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::de::DeserializeOwned;
 
 use crate::{
     Observer,
-    experiment::Experiment,
+    experiment::{self, Experiment},
     figure::Figure,
     table::{Format, Table, check, csv_page, markdown_page, read_csv},
 };
@@ -68,6 +69,51 @@ pub struct OutputArgs {
     /// Measure what differs from run to run (timings) as well
     #[arg(long)]
     pub timings: bool,
+}
+
+/// Which experiments to run, from which data, and what becomes of their results.
+#[derive(Args, Clone, Debug)]
+pub struct RunArgs {
+    /// Experiment files, such as `experiments/table-3.5.toml`; what they have in common is computed
+    /// once
+    #[arg(required = true, value_name = "FILE")]
+    pub experiments: Vec<PathBuf>,
+    /// Where their data is.
+    #[command(flatten)]
+    pub data: DataArgs,
+    /// How results are printed and kept.
+    #[command(flatten)]
+    pub output: OutputArgs,
+}
+
+impl RunArgs {
+    /// The experiments, all of them `chapter`'s.
+    ///
+    /// # Errors
+    ///
+    /// A file that is malformed or another chapter's, by its path; a data folder that is not there.
+    pub fn open<S: DeserializeOwned>(&self, chapter: &str) -> anyhow::Result<Vec<Experiment<S>>> {
+        let open = |path: &PathBuf| {
+            let experiment = experiment::load::<S>(path)?;
+            if experiment.chapter != chapter {
+                bail!("{}: belongs to `{}`", path.display(), experiment.chapter);
+            }
+            Ok(experiment)
+        };
+        let experiments = self.experiments.iter().map(open).collect::<anyhow::Result<_>>()?;
+        if !self.data.data.is_dir() {
+            bail!("{}: the data folder does not exist", self.data.data.display());
+        }
+        Ok(experiments)
+    }
+
+    /// `data/` beside the folder of the first experiment file: where the fixture lies.
+    #[must_use]
+    pub fn workspace_data(&self) -> PathBuf {
+        let first = self.experiments.first().map_or(Path::new(""), PathBuf::as_path);
+        let absolute = std::path::absolute(first).unwrap_or_else(|_| first.to_owned());
+        absolute.ancestors().nth(2).unwrap_or(Path::new("")).join("data")
+    }
 }
 
 /// Runs `body` as a program: errors to stderr, exit code 0, 1 or 2. A closed pipe is no error.

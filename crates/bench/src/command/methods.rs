@@ -38,9 +38,8 @@ fn line(method: &Method, roots: &[PathBuf]) -> String {
 fn everything(method: &Method, roots: &[PathBuf]) -> String {
     let dimensions: Vec<_> = method.dimensions.iter().map(ToString::to_string).collect();
     let dimension = method.dimensions[0];
-    let place = method
-        .locate(dimension, roots)
-        .map_or("absent".to_owned(), |path| path.display().to_string());
+    let place =
+        method.locate(dimension, roots).map_or("absent".to_owned(), |place| place.to_string());
     let preprocessing = method.preprocessing();
     let size = match preprocessing.size {
         Size::Fixed { height, width } => format!("height {height}, width {width}"),

@@ -1,6 +1,6 @@
 //! `sue run`: experiment files.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Context as _;
 use image::{
@@ -12,32 +12,14 @@ use sue::{
     study::{self, Context, Study},
 };
 use vpr_core::{
-    cli::{self, Bar, DataArgs, Outcome, OutputArgs},
+    cli::{self, Bar, Outcome, RunArgs},
     dataset::DataRoots,
-    experiment::{self, Experiment},
     map::replace,
 };
 
-/// Which experiments, from which data.
-#[derive(clap::Args)]
-pub(crate) struct RunArgs {
-    /// Experiment files, such as `experiments/table-5.2.toml`
-    #[arg(required = true, value_name = "FILE")]
-    experiments: Vec<PathBuf>,
-    #[command(flatten)]
-    data: DataArgs,
-    #[command(flatten)]
-    output: OutputArgs,
-}
-
 pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
-    let experiments =
-        args.experiments.iter().map(|path| load(path)).collect::<anyhow::Result<Vec<_>>>()?;
-    if !args.data.data.is_dir() {
-        anyhow::bail!("{}: the data folder does not exist", args.data.data.display());
-    }
-    let first = args.experiments.first().map_or(Path::new(""), PathBuf::as_path);
-    let roots = DataRoots::new([args.data.data.clone(), workspace_data(first)]);
+    let experiments = args.open::<Study>(env!("CARGO_PKG_NAME"))?;
+    let roots = DataRoots::new([args.data.data.clone(), args.workspace_data()]);
     let bar = Bar::default();
     let known = Known::default();
     let sources = Sources { roots: &roots, cache: &args.data.cache, observer: &bar, known: &known };
@@ -52,20 +34,6 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
         }
     }
     Ok(outcome)
-}
-
-fn load(path: &Path) -> anyhow::Result<Experiment<Study>> {
-    let experiment = experiment::load::<Study>(path)?;
-    if experiment.chapter != env!("CARGO_PKG_NAME") {
-        anyhow::bail!("{}: belongs to `{}`", path.display(), experiment.chapter);
-    }
-    Ok(experiment)
-}
-
-/// `data/` beside the folder of the experiment file: where the fixture lies.
-fn workspace_data(experiment: &Path) -> PathBuf {
-    let absolute = std::path::absolute(experiment).unwrap_or_else(|_| experiment.to_owned());
-    absolute.ancestors().nth(2).unwrap_or(Path::new("")).join("data")
 }
 
 /// Writes the contact sheet beside the page and shows it there.

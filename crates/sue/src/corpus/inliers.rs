@@ -199,7 +199,8 @@ pub fn inlier_counts(
         }
     }
     fs::create_dir_all(&folder).map_err(Error::io(&folder))?;
-    let stored: Vec<i64> = counts.iter().map(|&count| count as i64).collect();
+    let stored: Vec<i64> =
+        counts.iter().map(|&count| i64::try_from(count).unwrap_or(i64::MAX)).collect();
     npy::write_i64(&path, &stored)?;
     Ok(Verified::Counts(counts))
 }

@@ -123,8 +123,7 @@ pub fn by_name(name: &str, weights: Option<&Path>, roots: &[PathBuf]) -> Result<
 pub fn by_request(request: &Request) -> Result<Box<dyn Encoder>> {
     let method = Method::find(&request.name, request.backbone.as_deref())?;
     let dimension = method.dimension(request.dimension)?;
-    let path = method.weights(request.weights.as_deref(), dimension, &request.roots)?;
-    let weights = Weights::open(&path)?;
+    let weights = method.weights(request.weights.as_deref(), dimension, &request.roots)?;
     let device = Device::flex();
     let mut preprocessing = method.preprocessing();
     preprocessing.size = request.size.unwrap_or(preprocessing.size);

@@ -1,12 +1,37 @@
 //! The published checkpoints by name: `data/weights.toml`.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
 
 use serde::Deserialize;
 use vpr_core::Error;
 
 use super::{Channels, Interpolation, Preprocessing, Size};
-use crate::Result;
+use crate::{Result, weights::Weights};
+
+/// The weights every clone has (2.6 MB).
+const DEFAULT_ENCODER: &[u8] =
+    include_bytes!("../../../../data/models/default-encoder.safetensors");
+
+/// Where weights are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A file.
+    File(PathBuf),
+    /// Part of the program.
+    BuiltIn,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path) => path.display().fmt(f),
+            Self::BuiltIn => f.write_str("built in"),
+        }
+    }
+}
 
 /// One entry of `data/weights.toml`.
 #[derive(Clone, Debug, Deserialize)]
@@ -200,25 +225,28 @@ impl Method {
         self.origin.replace("{dimension}", &dimension.to_string())
     }
 
-    /// Its file in `weights/` or `models/` of one of these folders.
+    /// Its file in `weights/` or `models/` of one of these folders; the default network's are
+    /// built in as well.
     #[must_use]
-    pub fn locate(&self, dimension: usize, roots: &[PathBuf]) -> Option<PathBuf> {
+    pub fn locate(&self, dimension: usize, roots: &[PathBuf]) -> Option<Place> {
         let file = self.file(dimension);
         let place = |root: &PathBuf| ["weights", "models"].map(|it| root.join(it).join(&file));
-        roots.iter().flat_map(place).find(|path| path.is_file())
+        let found = roots.iter().flat_map(place).find(|path| path.is_file());
+        let built_in = || (self.architecture == Architecture::Default).then_some(Place::BuiltIn);
+        found.map(Place::File).or_else(built_in)
     }
 
-    /// [`Self::locate`], or why it is not there.
+    /// What [`Self::locate`] finds, read; or why it is not there.
     pub(super) fn weights(
         &self,
         given: Option<&Path>,
         dimension: usize,
         roots: &[PathBuf],
-    ) -> Result<PathBuf> {
+    ) -> Result<Weights> {
         if let Some(path) = given {
-            return Ok(path.to_owned());
+            return Weights::open(path);
         }
-        self.locate(dimension, roots).ok_or_else(|| {
+        let place = self.locate(dimension, roots).ok_or_else(|| {
             let searched: Vec<_> = roots.iter().map(|it| it.display().to_string()).collect();
             let reason = format!(
                 "not in weights/ or models/ of {}; it is from {}",
@@ -226,7 +254,11 @@ impl Method {
                 self.origin(dimension)
             );
             crate::Error::format(self.file(dimension), "weights", reason)
-        })
+        })?;
+        match place {
+            Place::File(path) => Weights::open(&path),
+            Place::BuiltIn => Weights::read(self.file(dimension).as_ref(), DEFAULT_ENCODER),
+        }
     }
 
     /// How images become its input.

@@ -8,6 +8,7 @@ mod distance;
 mod multi_similarity;
 mod relative_pose;
 mod self_teaching;
+mod supervised_contrastive;
 mod triplet;
 
 pub use bayesian_triplet::{BayesianTriplet, positive};
@@ -15,6 +16,7 @@ pub use distance::distance_based;
 pub use multi_similarity::MultiSimilarity;
 pub use relative_pose::relative_pose;
 pub use self_teaching::{LogVariance, SelfTeaching};
+pub use supervised_contrastive::SupervisedContrastive;
 pub use triplet::Triplet;
 
 use burn::tensor::Tensor;

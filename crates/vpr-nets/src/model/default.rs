@@ -1,42 +1,45 @@
-//! The default network: a small residual trunk with a `GeM` head, trained on generated streets.
+//! The default network: a small residual trunk whose last map is pooled on a coarse grid, trained
+//! on generated streets.
 //!
-//! Our own design, 0.45 M parameters. No layer looks across the batch, so a descriptor depends on
-//! its image alone.
+//! Our own design, 0.65 M parameters. No layer looks across the batch, so a descriptor depends on
+//! its image alone. The grid keeps where in the image a thing is; a mean over the whole map does
+//! not, and finds fewer places.
 
 use std::path::Path;
 
 use burn::{
     config::Config,
-    module::Module,
+    module::{Module, Param},
     nn::{GroupNorm, GroupNormConfig, Linear, LinearConfig, PaddingConfig2d},
     store::{BurnToPyTorchAdapter, ModuleSnapshot, PyTorchToBurnAdapter, SafetensorsStore},
-    tensor::{Device, Tensor, TensorData, activation::relu},
+    tensor::{Device, Tensor, TensorData, activation::relu, module::adaptive_avg_pool2d},
 };
 use ndarray::Array2;
 use vpr_core::{Descriptors, Error, Result};
 
 use crate::{
     layer::{Conv2d, Conv2dConfig},
-    loss::MultiSimilarity,
-    train::Trainable,
+    loss::SupervisedContrastive,
+    train::{Affine, Trainable},
 };
 
 /// Width and height of the images it was trained on, pixels.
 pub const INPUT: (usize, usize) = (128, 96);
-/// Regions that every map is pooled over: the whole, its left, its middle and its right.
-const REGIONS: usize = 4;
-/// Keeps the logarithm of a generalised mean finite.
-const GEM_EPSILON: f64 = 1e-6;
+/// Rows and columns of the grid that the last map is pooled to.
+const GRID: [usize; 2] = [3, 4];
 
 /// Sizes of the default network.
 #[derive(Config, Debug)]
 pub struct DefaultEncoderConfig {
     /// Channels after the first convolution and after each of the three stages.
-    #[config(default = "[16, 32, 64, 128]")]
+    #[config(default = "[32, 32, 64, 128]")]
     pub widths: [usize; 4],
     /// Residual blocks of each stage.
     #[config(default = "[1, 1, 1]")]
     pub depths: [usize; 3],
+    /// Channels of the grid.
+    #[config(default = 48)]
+    pub reduced: usize,
     /// Length of a descriptor.
     #[config(default = 256)]
     pub dimension: usize,
@@ -54,12 +57,13 @@ pub struct DefaultEncoder {
 pub struct Trunk {
     stem: Unit,
     stages: Vec<Stage>,
+    reduce: Conv2d,
 }
 
-/// Halves the map, then residual blocks.
+/// Changes the width, halves the map except in the first stage, then residual blocks.
 #[derive(Module, Debug)]
 struct Stage {
-    down: Unit,
+    enter: Unit,
     blocks: Vec<Block>,
 }
 
@@ -69,7 +73,7 @@ struct Block {
     second: Unit,
 }
 
-/// A 3 × 3 convolution and its group normalisation.
+/// A convolution and its group normalisation.
 #[derive(Module, Debug)]
 struct Unit {
     conv: Conv2d,
@@ -85,7 +89,7 @@ impl DefaultEncoderConfig {
     #[must_use]
     pub fn init(&self, device: &Device) -> DefaultEncoder {
         let trunk = self.trunk(device);
-        let head = LinearConfig::new(self.pooled(), self.dimension).with_bias(false).init(device);
+        let head = LinearConfig::new(self.pooled(), self.dimension).init(device);
         DefaultEncoder { trunk, head }
     }
 
@@ -96,17 +100,23 @@ impl DefaultEncoderConfig {
     /// If a width is not a multiple of 8.
     #[must_use]
     pub fn trunk(&self, device: &Device) -> Trunk {
-        let stages = self.widths.windows(2).zip(self.depths).map(|(widths, depth)| Stage {
-            down: Unit::new(widths[0], widths[1], 2, device),
+        let stages = self.widths.windows(2).zip(self.depths).enumerate();
+        let stages = stages.map(|(number, (widths, depth))| Stage {
+            enter: Unit::new([widths[0], widths[1]], 3, if number == 0 { 1 } else { 2 }, device),
             blocks: (0..depth).map(|_| Block::new(widths[1], device)).collect(),
         });
-        Trunk { stem: Unit::new(3, self.widths[0], 2, device), stages: stages.collect() }
+        let reduce = Conv2dConfig::new([self.widths[3], self.reduced], [1, 1]).with_bias(false);
+        Trunk {
+            stem: Unit::new([3, self.widths[0]], 7, 4, device),
+            stages: stages.collect(),
+            reduce: reduce.init(device),
+        }
     }
 
-    /// Length of what the trunk's pooling gives: two maps, four regions each.
+    /// Length of what the trunk's pooling gives.
     #[must_use]
     pub fn pooled(&self) -> usize {
-        REGIONS * (self.widths[2] + self.widths[3])
+        self.reduced * GRID[0] * GRID[1]
     }
 }
 
@@ -122,6 +132,21 @@ impl DefaultEncoder {
     #[must_use]
     pub fn project(&self, pooled: Tensor<2>) -> Tensor<2> {
         unit_rows(self.head.forward(pooled))
+    }
+
+    /// Sets the projection so that these images' pooled features enter it with mean 0 and variance 1,
+    /// feature by feature. Pooled features of random weights are nearly the same for all images;
+    /// training would spend its first thousand steps on what they share.
+    #[must_use]
+    pub fn centred(mut self, images: Tensor<4>) -> Self {
+        let pooled = self.trunk.forward(images).detach();
+        let mean = pooled.clone().mean_dim(0);
+        let deviation = (pooled - mean.clone()).square().mean_dim(0).sqrt() + 1e-3;
+        let weight = self.head.weight.val().detach() / deviation.transpose();
+        let bias = mean.matmul(weight.clone()).neg().flatten(0, 1);
+        self.head.weight = Param::from_tensor(weight.detach());
+        self.head.bias = Some(Param::from_tensor(bias.detach()));
+        self
     }
 
     /// Reads weights as [`Self::save`] writes them.
@@ -155,26 +180,50 @@ impl DefaultEncoder {
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] if a descriptor is not finite.
+    /// [`Error::Format`] if the images are not of that size; [`Error::NotFinite`].
     pub fn describe(
         &self,
         images: &[f32],
         size: (usize, usize),
         batch: usize,
     ) -> Result<Descriptors> {
-        let each = 3 * size.0 * size.1;
         let network = self.clone().valid();
-        let mut values = Vec::new();
-        for part in images.chunks(each * batch) {
-            let shape = [part.len() / each, 3, size.1, size.0];
-            let images = Tensor::from_data(TensorData::new(part.to_vec(), shape), &Device::flex());
-            let rows = network.forward(images).into_data();
-            values.extend(rows.iter::<f32>());
+        Descriptors::new(rows(images, size, batch, |images| network.forward(images))?)
+    }
+
+    /// The trunk's features of images given as to [`Self::describe`], `n × pooled`.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] if the images are not of that size.
+    pub fn pooled(
+        &self,
+        images: &[f32],
+        size: (usize, usize),
+        batch: usize,
+    ) -> Result<Array2<f32>> {
+        let trunk = self.trunk.clone().valid();
+        rows(images, size, batch, |images| trunk.forward(images))
+    }
+
+    /// The same trunk under another projection, such as [`crate::train::learned_whitening`] gives.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Mismatch`] if it does not take what the trunk gives.
+    pub fn with_projection(mut self, projection: &Affine) -> Result<Self> {
+        let [expected, _] = self.head.weight.dims();
+        let (actual, to) = projection.weight.dim();
+        if actual != expected {
+            return Err(Error::Mismatch { what: "features of a projection", expected, actual });
         }
-        let shape = (images.len() / each, self.dimension());
-        let rows = Array2::from_shape_vec(shape, values)
-            .map_err(|cause| Error::format("images", "shape", cause.to_string()))?;
-        Descriptors::new(rows)
+        let device = self.head.weight.device();
+        let weight = projection.weight.iter().copied().collect::<Vec<f32>>();
+        let weight = TensorData::new(weight, [actual, to]);
+        self.head.weight = Param::from_tensor(Tensor::from_data(weight, &device));
+        let bias = TensorData::new(projection.bias.to_vec(), [to]);
+        self.head.bias = Some(Param::from_tensor(Tensor::from_data(bias, &device)));
+        Ok(self)
     }
 
     /// The convolutions and the pooling.
@@ -192,29 +241,24 @@ impl DefaultEncoder {
 
 impl Trainable for DefaultEncoder {
     fn loss(&self, images: Tensor<4>, places: &[usize]) -> Tensor<1> {
-        MultiSimilarity::default().forward(self.forward(images), places)
+        SupervisedContrastive::default().forward(self.forward(images), places)
     }
 }
 
 impl Trunk {
-    /// Pools images as [`DefaultEncoder::forward`] takes them to `batch × pooled` features.
+    /// Images as [`DefaultEncoder::forward`] takes them to `batch × pooled` features: every channel
+    /// of the grid, row by row.
     #[must_use]
     pub fn forward(&self, images: Tensor<4>) -> Tensor<2> {
-        let mut map = relu(self.stem.forward(standardized(images)));
-        let mut pooled = Vec::new();
-        for (number, stage) in self.stages.iter().enumerate() {
-            map = stage.forward(map);
-            if number + 2 >= self.stages.len() {
-                pooled.push(gem(map.clone()));
-            }
-        }
-        Tensor::cat(pooled, 1)
+        let map = relu(self.stem.forward(standardized(images)));
+        let map = self.stages.iter().fold(map, |map, stage| stage.forward(map));
+        adaptive_avg_pool2d(self.reduce.forward(map), GRID).flatten(1, 3)
     }
 }
 
 impl Stage {
     fn forward(&self, map: Tensor<4>) -> Tensor<4> {
-        let map = relu(self.down.forward(map));
+        let map = relu(self.enter.forward(map));
         self.blocks.iter().fold(map, |map, block| block.forward(map))
     }
 }
@@ -222,8 +266,8 @@ impl Stage {
 impl Block {
     fn new(width: usize, device: &Device) -> Self {
         Self {
-            first: Unit::new(width, width, 1, device),
-            second: Unit::new(width, width, 1, device),
+            first: Unit::new([width, width], 3, 1, device),
+            second: Unit::new([width, width], 3, 1, device),
         }
     }
 
@@ -234,12 +278,13 @@ impl Block {
 }
 
 impl Unit {
-    fn new(from: usize, to: usize, stride: usize, device: &Device) -> Self {
-        let conv = Conv2dConfig::new([from, to], [3, 3])
+    fn new(channels: [usize; 2], kernel: usize, stride: usize, device: &Device) -> Self {
+        let (side, width) = (kernel / 2, channels[1]);
+        let conv = Conv2dConfig::new(channels, [kernel, kernel])
             .with_stride([stride, stride])
-            .with_padding(PaddingConfig2d::Explicit(1, 1, 1, 1))
+            .with_padding(PaddingConfig2d::Explicit(side, side, side, side))
             .with_bias(false);
-        Self { conv: conv.init(device), norm: GroupNormConfig::new(to / 8, to).init(device) }
+        Self { conv: conv.init(device), norm: GroupNormConfig::new(width / 8, width).init(device) }
     }
 
     fn forward(&self, map: Tensor<4>) -> Tensor<4> {
@@ -257,36 +302,23 @@ fn standardized(images: Tensor<4>) -> Tensor<4> {
     (centred / (variance + 1e-4).sqrt()).reshape([batch, channels, height, width])
 }
 
-/// Generalised mean with exponent 3 (Radenović, Tolias and Chum 2019) over four regions of a
-/// non-negative map: `batch × channels × height × width` to `batch × 4 channels`.
-fn gem(map: Tensor<4>) -> Tensor<2> {
-    let [batch, channels, height, width] = map.dims();
-    let regions = regions(height, width, &map.device());
-    let flat = map.reshape([batch, channels, height * width]);
-    let cubes = flat.clone() * flat.clone() * flat;
-    let means = cubes.matmul(regions.unsqueeze());
-    ((means + GEM_EPSILON).log() / 3.0).exp().reshape([batch, channels * REGIONS])
-}
-
-/// Weights of the pixels in each region, `pixels × regions`, columns of sum one: all alike, and
-/// triangles over the width around the left edge, the middle and the right edge.
-fn regions(height: usize, width: usize, device: &Device) -> Tensor<2> {
-    let weight = |column: usize, region: usize| {
-        let across = (column as f32 + 0.5) / width as f32;
-        if region == 0 {
-            1.0
-        } else {
-            (1.0 - (2.0 * across - (region as f32 - 1.0)).abs()).max(0.0)
-        }
-    };
-    let totals: Vec<f32> = (0..REGIONS)
-        .map(|region| height as f32 * (0..width).map(|column| weight(column, region)).sum::<f32>())
-        .collect();
-    let weights: Vec<f32> = (0..height * width)
-        .flat_map(|pixel| (0..REGIONS).map(move |region| (pixel % width, region)))
-        .map(|(column, region)| weight(column, region) / totals[region])
-        .collect();
-    Tensor::from_data(TensorData::new(weights, [height * width, REGIONS]), device)
+/// What `forward` makes of images, a batch at a time.
+fn rows(
+    images: &[f32],
+    size: (usize, usize),
+    batch: usize,
+    forward: impl Fn(Tensor<4>) -> Tensor<2>,
+) -> Result<Array2<f32>> {
+    let each = 3 * size.0 * size.1;
+    let mut values = Vec::new();
+    for part in images.chunks(each * batch.max(1)) {
+        let shape = [part.len() / each, 3, size.1, size.0];
+        let images = Tensor::from_data(TensorData::new(part.to_vec(), shape), &Device::flex());
+        values.extend(forward(images).into_data().iter::<f32>());
+    }
+    let n = images.len() / each;
+    Array2::from_shape_vec((n, values.len() / n.max(1)), values)
+        .map_err(|cause| Error::format("images", "shape", cause.to_string()))
 }
 
 fn unit_rows(rows: Tensor<2>) -> Tensor<2> {
@@ -329,16 +361,5 @@ mod tests {
         let gap: f32 =
             (network.forward(images) - network.forward(coloured)).abs().max().into_scalar();
         assert!(gap < 1e-2, "{gap}");
-    }
-
-    #[test]
-    fn regions_weigh_every_pixel_and_sum_to_one() {
-        let weights: Vec<f32> = regions(2, 4, &Device::flex()).into_data().try_to_vec().unwrap();
-        for region in 0..REGIONS {
-            let sum: f32 = weights.iter().skip(region).step_by(REGIONS).sum();
-            assert!((sum - 1.0).abs() < 1e-6);
-        }
-        // First pixel: an eighth of the whole, most of the left, nothing of the right.
-        assert!((weights[0] - 0.125).abs() < 1e-6 && weights[1] > 0.3 && weights[3] == 0.0);
     }
 }

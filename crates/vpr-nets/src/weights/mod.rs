@@ -96,19 +96,27 @@ impl Weights {
     /// [`vpr_core::Error::Io`]; [`vpr_core::Error::Format`] with key or byte where the file is
     /// truncated, malformed, names what is not on the list, or holds a NaN or infinity.
     pub fn open(path: &Path) -> Result<Self> {
-        let bytes = fs::read(path).map_err(vpr_core::Error::io(path))?;
-        let tensors = if zip::is_archive(&bytes) {
-            zip::read(path, &bytes)?
-        } else if legacy::is_legacy(&bytes) {
-            legacy::read(path, &bytes)?
+        Self::read(path, &fs::read(path).map_err(vpr_core::Error::io(path))?)
+    }
+
+    /// The same of bytes; `path` is what errors call them.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::open`], reading apart.
+    pub fn read(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let tensors = if zip::is_archive(bytes) {
+            zip::read(path, bytes)?
+        } else if legacy::is_legacy(bytes) {
+            legacy::read(path, bytes)?
         } else {
-            safetensors::read(path, &bytes)?
+            safetensors::read(path, bytes)?
         };
         if tensors.is_empty() {
             return Err(Error::format(path, "content", "there is no tensor in it"));
         }
         let tensors = storage::without_shared_prefix(tensors);
-        let digest = hexadecimal(&Sha256::digest(&bytes));
+        let digest = hexadecimal(&Sha256::digest(bytes));
         Ok(Self { path: path.to_owned(), digest, tensors })
     }
 

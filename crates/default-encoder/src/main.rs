@@ -1,0 +1,37 @@
+//! The `default-encoder` program: trains the default network on generated streets and says how far
+//! it carries.
+
+mod augment;
+mod batches;
+mod cities;
+mod pixels;
+mod train;
+mod validate;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use vpr_core::cli;
+
+/// The small network that every clone has.
+#[derive(Parser)]
+#[command(version, about, propagate_version = true)]
+struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Train it on generated streets; a killed run goes on where it stopped
+    Train(train::Args),
+    /// Recall@1 on worlds it has not seen, and on real datasets at hand
+    Validate(validate::Args),
+}
+
+fn main() -> ExitCode {
+    cli::main(|| match Args::parse().command {
+        Command::Train(args) => train::run(&args),
+        Command::Validate(args) => validate::run(&args),
+    })
+}

@@ -1,0 +1,44 @@
+//! From a network's name to the program that trains it.
+
+use std::{
+    env,
+    ffi::OsString,
+    process::{Command, ExitCode},
+};
+
+use anyhow::Context;
+use clap::ValueEnum;
+
+use crate::reproduce::workspace_root;
+
+/// Which network; what follows goes to its program.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    /// The network
+    network: Network,
+    /// Passed on, such as `--seed 2 --steps 500`
+    #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGS")]
+    rest: Vec<OsString>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Network {
+    /// `data/models/default-encoder.safetensors`
+    DefaultEncoder,
+}
+
+/// Runs the program and passes its exit code on.
+pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let program = match args.network {
+        Network::DefaultEncoder => "default-encoder",
+    };
+    let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let status = Command::new(cargo)
+        .current_dir(workspace_root()?)
+        .args(["run", "--quiet", "--bin", program, "--", "train"])
+        .args(&args.rest)
+        .status()
+        .with_context(|| format!("running `{program}`"))?;
+    let code = status.code().and_then(|code| u8::try_from(code).ok()).map_or(2, |code| code.min(2));
+    Ok(ExitCode::from(code))
+}
