@@ -36,7 +36,7 @@ use crate::{
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Study {
     /// What each family needs: table 5.1.
-    Needs,
+    Needs {},
     /// AUC-PR of all estimators: table 5.2.
     Comparison {
         /// Datasets with their encoders.
@@ -166,7 +166,7 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
     let (mut figure, mut picture) = (None, None);
     let out = &mut table;
     match &experiment.study {
-        Study::Needs => needs::run(out),
+        Study::Needs {} => needs::run(out),
         Study::Comparison { subjects } => comparison::run(out, subjects, context)?,
         Study::Metrics { subjects } => metrics::run(out, subjects, context)?,
         Study::Fusion { groups } => fusion::run(out, groups, context)?,

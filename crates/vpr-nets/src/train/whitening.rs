@@ -136,7 +136,7 @@ mod tests {
 
     use super::*;
 
-    /// 40 places of 4 images: two telling features under a nuisance of 20 times their size.
+    /// 40 places of 4 images: two telling features under a nuisance of four times their size.
     fn images() -> (Array2<f32>, Vec<usize>) {
         let mut random = ChaCha8Rng::seed_from_u64(3);
         let places: Vec<usize> = (0..160).map(|image| 100 + image / 4).collect();
@@ -145,8 +145,8 @@ mod tests {
             let place = (image / 4) as f32;
             let mut noise = || random.random_range(-1.0..1.0_f32);
             let nuisance = 20.0 * noise();
-            row[0] = place.sin() + nuisance + 7.0;
-            row[1] = place.cos() + nuisance + 0.01 * noise();
+            row[0] = 5.0 * place.sin() + nuisance + 7.0;
+            row[1] = 5.0 * place.cos() + nuisance + 0.01 * noise();
             row[2] = nuisance;
             row[3] = 0.01 * noise();
         }
