@@ -123,6 +123,19 @@ pub(super) struct Retrieved {
     pub(super) truth: Option<GroundTruth>,
 }
 
+impl Retrieved {
+    /// What one description of queries and references gave.
+    fn new(
+        [queries, references]: [Named; 2],
+        ranking: Ranking,
+        confidence: Vec<f64>,
+        descriptors: Option<(Descriptors, Descriptors)>,
+    ) -> Self {
+        let (alone, truth) = (None, None);
+        Self { queries, references, ranking, alone, confidence, descriptors, truth }
+    }
+}
+
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     if let Some(n) = args.num_workers {
         rayon::ThreadPoolBuilder::new().num_threads(n).build_global()?;
@@ -221,15 +234,7 @@ fn match_images(
     let ranking = matched.similarities.ranked(k)?;
     let descriptors = query_features.into_descriptors().zip(reference_features.into_descriptors());
     let confidence = matched.similarities.best().confidence;
-    Ok(Retrieved {
-        queries,
-        references,
-        ranking,
-        alone: None,
-        confidence,
-        descriptors,
-        truth: None,
-    })
+    Ok(Retrieved::new([queries, references], ranking, confidence, descriptors))
 }
 
 /// Describes images by a network and retrieves by Euclidean distance.
@@ -289,15 +294,7 @@ fn nearest(
         (0..retrieval.len()).map(|query| -f64::from(retrieval.distances(query)[0])).collect();
     let ranking = AsRef::<Ranking>::as_ref(&retrieval).clone();
     let descriptors = Some((query_rows, reference_rows));
-    Ok(Retrieved {
-        queries,
-        references,
-        ranking,
-        alone: None,
-        confidence,
-        descriptors,
-        truth: None,
-    })
+    Ok(Retrieved::new([queries, references], ranking, confidence, descriptors))
 }
 
 /// Retrieves from two files of descriptors by Euclidean distance.
