@@ -25,17 +25,24 @@ pub(crate) struct Args {
 enum Network {
     /// `data/models/default-encoder.safetensors`
     DefaultEncoder,
+    /// `data/models/btl-default.safetensors`
+    Btl,
+    /// `data/models/stun-default.safetensors`
+    Stun,
 }
 
 /// Runs the program and passes its exit code on.
 pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let program = match args.network {
-        Network::DefaultEncoder => "default-encoder",
+    let (program, words): (_, &[&str]) = match args.network {
+        Network::DefaultEncoder => ("default-encoder", &["train"]),
+        Network::Btl => ("sue", &["train", "btl"]),
+        Network::Stun => ("sue", &["train", "stun"]),
     };
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(cargo)
         .current_dir(workspace_root()?)
-        .args(["run", "--quiet", "--bin", program, "--", "train"])
+        .args(["run", "--quiet", "--bin", program, "--"])
+        .args(words)
         .args(&args.rest)
         .status()
         .with_context(|| format!("running `{program}`"))?;

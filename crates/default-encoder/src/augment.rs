@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use crate::pixels::Pixels;
 
 /// Draws one variant of `image` at the size of `output`, three planes of values in 0 to 1.
-pub(crate) fn augment(image: Pixels<'_>, size: (usize, usize), seed: u64, output: &mut [f32]) {
+pub fn augment(image: Pixels<'_>, size: (usize, usize), seed: u64, output: &mut [f32]) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     crop(image, size, &mut random, output);
     light(output, &mut random);

@@ -14,21 +14,22 @@ use crate::{
 };
 
 /// How many images a step sees.
-#[derive(Clone, Copy)]
-pub(crate) struct Sizes {
+#[derive(Clone, Copy, Debug)]
+pub struct Sizes {
     /// Width and height that the network takes.
-    pub(crate) input: (usize, usize),
-    /// Places, a multiple of [`FROM_ONE_CITY`].
-    pub(crate) places: usize,
+    pub input: (usize, usize),
+    /// Places, a multiple of four.
+    pub places: usize,
     /// Images of each place, up to [`VISITS`].
-    pub(crate) views: usize,
+    pub views: usize,
 }
 
 /// Neighbouring places of one city in a step: what a network confuses first.
 const FROM_ONE_CITY: usize = 4;
 
 /// The batch of a step.
-pub(crate) fn batch(cities: &[Album], sizes: Sizes, seed: u64, step: usize) -> Batch {
+#[must_use]
+pub fn batch(cities: &[Album], sizes: Sizes, seed: u64, step: usize) -> Batch {
     let size = sizes.input;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(step as u64 + 1);
@@ -55,7 +56,8 @@ pub(crate) fn batch(cities: &[Album], sizes: Sizes, seed: u64, step: usize) -> B
 }
 
 /// One variant of every image of a city, `PLACES × VISITS` of them.
-pub(crate) fn variants(city: &Album, size: (usize, usize), seed: u64) -> Vec<f32> {
+#[must_use]
+pub fn variants(city: &Album, size: (usize, usize), seed: u64) -> Vec<f32> {
     let each = 3 * size.0 * size.1;
     let mut images = vec![0.0; each * PLACES * VISITS];
     images.par_chunks_mut(each).enumerate().for_each(|(number, output)| {

@@ -12,11 +12,11 @@ use xxhash_rust::xxh3::xxh3_64;
 use crate::pixels::Album;
 
 /// Places of a city.
-pub(crate) const PLACES: usize = 80;
+pub const PLACES: usize = 80;
 /// Visits to it: each gives one image of every place.
-pub(crate) const VISITS: usize = 5;
+pub const VISITS: usize = 5;
 /// Avenues of a city: a quarter of the places lies on each.
-pub(crate) const AVENUES: usize = 4;
+pub const AVENUES: usize = 4;
 /// Seed of the first city; the worlds that come with `vpr-worlds` have seeds below.
 const FIRST_SEED: u64 = 5_001;
 /// Width and height of an image: a crop of it becomes the network's input.
@@ -24,7 +24,11 @@ const SIZE: (usize, usize) = (160, 120);
 
 /// The cities, rendered unless the cache has them: `PLACES × VISITS` images each, a place's visits
 /// beside each other.
-pub(crate) fn open(n: usize, seed: u64, cache: &Path) -> anyhow::Result<Vec<Album>> {
+///
+/// # Errors
+///
+/// A cache that cannot be written, by its path.
+pub fn open(n: usize, seed: u64, cache: &Path) -> anyhow::Result<Vec<Album>> {
     fs::create_dir_all(cache).with_context(|| cache.display().to_string())?;
     let bar = cli::progress("cities", n);
     let mut albums = Vec::with_capacity(n);

@@ -1,10 +1,6 @@
 //! The `default-encoder` program: trains the default network on generated streets and says how far
 //! it carries.
 
-mod augment;
-mod batches;
-mod cities;
-mod pixels;
 mod train;
 mod validate;
 

@@ -12,15 +12,19 @@ use image::RgbImage;
 use rayon::prelude::*;
 
 /// One image: rows of red, green, blue.
-#[derive(Clone, Copy)]
-pub(crate) struct Pixels<'a> {
-    pub(crate) bytes: &'a [u8],
-    pub(crate) width: usize,
-    pub(crate) height: usize,
+#[derive(Clone, Copy, Debug)]
+pub struct Pixels<'a> {
+    /// `3 × width × height` bytes.
+    pub bytes: &'a [u8],
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
 }
 
 /// Images of one size, back to back.
-pub(crate) struct Album {
+#[derive(Clone, Debug)]
+pub struct Album {
     bytes: Vec<u8>,
     width: usize,
     height: usize,
@@ -28,7 +32,8 @@ pub(crate) struct Album {
 
 impl Pixels<'_> {
     /// The colour between pixels, in 0 to 1; the border goes on outside.
-    pub(crate) fn bilinear(&self, x: f32, y: f32) -> [f32; 3] {
+    #[must_use]
+    pub fn bilinear(&self, x: f32, y: f32) -> [f32; 3] {
         let (x, y) =
             (x.clamp(0.0, (self.width - 1) as f32), y.clamp(0.0, (self.height - 1) as f32));
         let (left, top) = (x.floor(), y.floor());
@@ -50,11 +55,18 @@ impl Pixels<'_> {
 
 impl Album {
     /// Images of this width and height, back to back.
-    pub(crate) fn new(bytes: Vec<u8>, (width, height): (usize, usize)) -> Self {
+    #[must_use]
+    pub fn new(bytes: Vec<u8>, (width, height): (usize, usize)) -> Self {
         Self { bytes, width, height }
     }
 
-    pub(crate) fn get(&self, index: usize) -> Pixels<'_> {
+    /// One image.
+    ///
+    /// # Panics
+    ///
+    /// If there are not so many.
+    #[must_use]
+    pub fn get(&self, index: usize) -> Pixels<'_> {
         let each = 3 * self.width * self.height;
         let bytes = &self.bytes[index * each..(index + 1) * each];
         Pixels { bytes, width: self.width, height: self.height }
@@ -68,10 +80,11 @@ fn decode(path: &Path) -> anyhow::Result<RgbImage> {
 }
 
 /// Images of any size as planes of values in 0 to 1, resized by an antialiased bilinear filter.
-pub(crate) fn planes(
-    paths: &[PathBuf],
-    (width, height): (usize, usize),
-) -> anyhow::Result<Vec<f32>> {
+///
+/// # Errors
+///
+/// An image that cannot be read or decoded, by its path.
+pub fn planes(paths: &[PathBuf], (width, height): (usize, usize)) -> anyhow::Result<Vec<f32>> {
     let plane = width * height;
     let mut values = vec![0.0; 3 * plane * paths.len()];
     values.par_chunks_mut(3 * plane).zip(paths).try_for_each(|(values, path)| {

@@ -7,6 +7,11 @@ use std::{
 };
 
 use anyhow::Context;
+use default_encoder::{
+    batches::{Sizes, batch, variants},
+    cities::{self, VISITS},
+    pixels::Album,
+};
 use ndarray::{Axis, concatenate};
 use vpr_core::cli::{self, Outcome};
 use vpr_nets::{
@@ -14,12 +19,7 @@ use vpr_nets::{
     train::{Checkpoint, Descent, Optimizer, Report, Schedule, learned_whitening, seeded},
 };
 
-use crate::{
-    batches::{Sizes, batch, variants},
-    cities::{self, VISITS},
-    pixels::Album,
-    validate::{self, BATCH},
-};
+use crate::validate::{self, BATCH};
 
 /// Steps between two lines of the log.
 const LOG_EVERY: usize = 25;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
+use default_encoder::pixels::planes;
 use ndarray::Array2;
 use rayon::prelude::*;
 use vpr_core::{
@@ -21,8 +22,6 @@ use vpr_vision::{
     image,
 };
 use vpr_worlds::{World, open_named, recipe_with};
-
-use crate::pixels::planes;
 
 /// Images that go through the network at a time.
 pub(crate) const BATCH: usize = 32;

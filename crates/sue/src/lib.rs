@@ -33,6 +33,7 @@ mod estimator;
 pub mod evaluate;
 mod evidence;
 pub mod fusion;
+pub mod net;
 pub mod study;
 
 pub use choice::{EstimatorChoice, EstimatorSettings, Prepared};

@@ -23,6 +23,8 @@ enum Command {
     Evaluate(Box<command::evaluate::EvaluateArgs>),
     /// Choose a threshold that keeps a promise, from queries whose correct references are known
     Calibrate(Box<command::calibrate::CalibrateArgs>),
+    /// Train a network that says how sure it is; a killed run goes on where it stopped
+    Train(command::train::TrainArgs),
     /// Run an experiment file and compare it with the numbers of the thesis
     Run(cli::RunArgs),
 }
@@ -32,6 +34,7 @@ fn main() -> ExitCode {
         Command::Estimate(args) => command::estimate::run(&args),
         Command::Evaluate(args) => command::evaluate::run(&args),
         Command::Calibrate(args) => command::calibrate::run(&args),
+        Command::Train(args) => command::train::run(&args),
         Command::Run(args) => command::run::run(&args),
     })
 }

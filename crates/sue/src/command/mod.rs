@@ -5,4 +5,5 @@ pub(crate) mod estimate;
 pub(crate) mod evaluate;
 mod input;
 pub(crate) mod run;
+pub(crate) mod train;
 mod truth;

@@ -10,7 +10,7 @@ use vpr_core::{
     map::{About, OpenMap, Opening, RowType, door::Parts},
     retrieve,
 };
-use vpr_nets::encode::{self, Options, registry::Method};
+use vpr_nets::encode::{self, Encoder, Options, registry::Method};
 use vpr_vision::{
     cohog::{self, CoHog, CoHogParams},
     hog::{Hog, HogParams},
@@ -18,7 +18,10 @@ use vpr_vision::{
 };
 
 use super::{RANKS, Sources, keys::key, retrieval_of};
-use crate::Result;
+use crate::{
+    Result,
+    net::{Learned, LearnedEncoder},
+};
 
 /// What became of a dataset under one encoder.
 pub(super) enum Described {
@@ -28,6 +31,8 @@ pub(super) enum Described {
         encoder: String,
         /// What it retrieves.
         retrieval: Retrieval,
+        /// Variances of the queries' descriptors, one row each.
+        variances: Option<Array2<f32>>,
     },
     /// The encoder is not at hand, and why.
     NotAtHand(String),
@@ -39,7 +44,11 @@ pub(super) fn describe(
     sources: &Sources<'_>,
 ) -> Result<Described> {
     let (queries, references) = (&dataset.queries, &dataset.references);
-    let named = |name: &str, retrieval| Described::As { encoder: name.to_owned(), retrieval };
+    let named = |name: &str, retrieval| Described::As {
+        encoder: name.to_owned(),
+        retrieval,
+        variances: None,
+    };
     match encoder {
         "hog" => {
             let hog = Hog::new(HogParams::RELEASED)?;
@@ -66,7 +75,10 @@ pub(super) fn describe(
             let similarities = cohog::similarities(&of(queries)?, &of(references)?)?;
             Ok(named("CoHOG", retrieval_of(&similarities)?))
         }
-        name => network(name, dataset, sources),
+        name => match Learned::named(name) {
+            Some(learned) => with_variances(learned, dataset, sources),
+            None => network(name, dataset, sources),
+        },
     }
 }
 
@@ -97,31 +109,64 @@ fn network(name: &str, dataset: &Dataset, sources: &Sources<'_>) -> Result<Descr
         return Ok(Described::NotAtHand(why));
     }
     let encoder = encode::by_name(name, None, &sources.roots.roots)?;
-    let of = |images: &[PathBuf]| -> Result<Descriptors> {
-        let digest = encoder.weights_digest().unwrap_or_default();
-        let method = format!("descriptors 1 {name} {digest} {:?}", encoder.preprocessing());
-        let file = format!("{}.safetensors", key(&method, &images.iter().collect::<Vec<_>>())?);
-        let path = sources.cache.join("descriptors").join(file);
-        let about = About {
-            encoder: Some(name.to_owned()),
-            weights_digest: encoder.weights_digest().map(str::to_owned),
-            ..About::default()
-        };
-        cached(&path, &about, || {
-            sources.observer.start(&format!("{name} on {}", dataset.name), images.len());
-            let mut n_done = 0;
-            let mut done = |upto: usize| {
-                (n_done..upto).for_each(|_| sources.observer.step());
-                n_done = upto;
-            };
-            let rows = encode::encode_files(&*encoder, images, &Options::default(), &mut done);
-            sources.observer.end();
-            Ok(rows?.normalized())
-        })
-    };
+    let of =
+        |images: &[PathBuf]| rows(&*encoder, images, dataset, sources, Descriptors::normalized);
     let (queries, references) = (of(&dataset.queries)?, of(&dataset.references)?);
     let retrieval = retrieve(&queries, &references, RANKS)?;
-    Ok(Described::As { encoder: name.to_owned(), retrieval })
+    Ok(Described::As { encoder: name.to_owned(), retrieval, variances: None })
+}
+
+/// A network that predicts variances with its descriptors.
+fn with_variances(learned: Learned, dataset: &Dataset, sources: &Sources<'_>) -> Result<Described> {
+    let file = learned.weights();
+    let Ok(path) = sources.roots.find(&file) else {
+        let (name, key) = (learned.name(), learned.key());
+        let why = format!(
+            "{name}: its weights, {}, are not at hand; `sue train {key}` makes them",
+            file.display()
+        );
+        return Ok(Described::NotAtHand(why));
+    };
+    let encoder = LearnedEncoder::open(learned, &path)?;
+    let of = |images: &[PathBuf]| {
+        // Descriptors have length one; the variances behind them stay as they are.
+        encoder.split(&rows(&encoder, images, dataset, sources, |rows| rows)?)
+    };
+    let (queries, references) = (of(&dataset.queries)?, of(&dataset.references)?);
+    let retrieval = retrieve(&queries.descriptors, &references.descriptors, RANKS)?;
+    let variances = Some(queries.variances);
+    Ok(Described::As { encoder: learned.name().to_owned(), retrieval, variances })
+}
+
+/// What a network gives for every image, finished; from the cache if it is there.
+fn rows(
+    encoder: &dyn Encoder,
+    images: &[PathBuf],
+    dataset: &Dataset,
+    sources: &Sources<'_>,
+    finish: impl FnOnce(Descriptors) -> Descriptors,
+) -> Result<Descriptors> {
+    let name = encoder.name();
+    let digest = encoder.weights_digest().unwrap_or_default();
+    let method = format!("descriptors 1 {name} {digest} {:?}", encoder.preprocessing());
+    let file = format!("{}.safetensors", key(&method, &images.iter().collect::<Vec<_>>())?);
+    let path = sources.cache.join("descriptors").join(file);
+    let about = About {
+        encoder: Some(name.to_owned()),
+        weights_digest: encoder.weights_digest().map(str::to_owned),
+        ..About::default()
+    };
+    cached(&path, &about, || {
+        sources.observer.start(&format!("{name} on {}", dataset.name), images.len());
+        let mut n_done = 0;
+        let mut done = |upto: usize| {
+            (n_done..upto).for_each(|_| sources.observer.step());
+            n_done = upto;
+        };
+        let rows = encode::encode_files(encoder, images, &Options::default(), &mut done);
+        sources.observer.end();
+        Ok(finish(rows?))
+    })
 }
 
 /// Descriptors from the cache, or made and kept there.

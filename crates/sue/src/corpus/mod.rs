@@ -21,7 +21,10 @@ use vpr_core::{
     table::Provenance,
 };
 
-use crate::{EstimatorChoice, EstimatorSettings, Result, evaluate::Judged};
+use crate::{
+    EstimatorChoice, EstimatorSettings, Result, UncertaintyEstimator, Variances, evaluate::Judged,
+    net::Learned,
+};
 
 /// References ranked per query: enough for every estimator and sweep.
 pub const RANKS: usize = 50;
@@ -64,6 +67,9 @@ pub struct Corpus {
     pub judged: Judged,
     /// Images of queries and references, if they are at hand.
     pub images: Option<(Vec<PathBuf>, Vec<PathBuf>)>,
+    /// Variances of the queries' descriptors, `n_queries × 1` or `n_queries × dimension`, if the
+    /// encoder predicts them.
+    pub variances: Option<Array2<f32>>,
     /// What a reader should know.
     pub note: Option<String>,
 }
@@ -89,6 +95,18 @@ impl Corpus {
     }
 }
 
+impl Corpus {
+    /// The uncertainties that its encoder predicts for the queries.
+    ///
+    /// # Errors
+    ///
+    /// [`vpr_core::Error::Empty`] if it predicts none.
+    pub fn variance(&self, learned: Learned) -> Result<Vec<f64>> {
+        let variances = self.variances.as_ref().ok_or(vpr_core::Error::Empty("variances"))?;
+        learned.estimator().estimate(&Variances::new(variances.view())?)
+    }
+}
+
 /// All corpora of one dataset: one per encoder, or the error that an encoder is not at hand.
 #[derive(Clone, Debug)]
 pub struct Opened {
@@ -104,7 +122,8 @@ pub const PUBLISHED: &str = "published";
 /// Opens a dataset as each of these encoders sees it.
 ///
 /// `id` is one of the manifest's, `world/…`, or the name of a [`Counterpart`]. Encoders are `hog`,
-/// `cohog`, [`PUBLISHED`] for stored score matrices, or a name that `vpr_nets::encode` knows.
+/// `cohog`, `btl`, `stun`, [`PUBLISHED`] for stored score matrices, or a name that
+/// `vpr_nets::encode` knows.
 ///
 /// # Errors
 ///
@@ -149,8 +168,9 @@ fn open_anew(id: &str, encoders: &[String], sources: &Sources<'_>) -> Result<Ope
     }
     for encoder in encoders {
         match encoded::describe(encoder, &dataset, sources)? {
-            encoded::Described::As { encoder, retrieval } => {
-                opened.corpora.push(corpus_of(&dataset, encoder, retrieval)?);
+            encoded::Described::As { encoder, retrieval, variances } => {
+                let corpus = corpus_of(&dataset, encoder, retrieval)?;
+                opened.corpora.push(Corpus { variances, ..corpus });
             }
             encoded::Described::NotAtHand(why) => opened.missing.push(why),
         }
@@ -178,6 +198,7 @@ fn corpus_of(dataset: &Dataset, encoder: String, retrieval: Retrieval) -> Result
         query_poses,
         truth: dataset.truth.clone(),
         images: Some((dataset.queries.clone(), dataset.references.clone())),
+        variances: None,
         note,
     })
 }

@@ -53,6 +53,7 @@ pub(super) fn open(entry: &DatasetEntry, sources: &Sources<'_>) -> Result<Vec<Co
             query_poses: None,
             truth,
             images: None,
+            variances: None,
             note: Some("frame indices stand for positions".to_owned()),
         });
     }

@@ -37,9 +37,10 @@ pub(super) fn run(table: &mut Table, subjects: &[Subject], context: Context<'_>)
             table.push(base.clone().defined(definition));
         }
         for it in &scored {
-            let remark = is_within_chance(opened, &scored, it, context)?.then_some(WITHIN_CHANCE);
+            let chance = is_within_chance(opened, &scored, it, context)?;
+            let remark = it.remark().or_else(|| chance.then(|| WITHIN_CHANCE.to_owned()));
             let place = (opened.row.as_str(), it.name);
-            opened.push_auc(table, place, it, remark, &context.resampling())?;
+            opened.push_auc(table, place, it, remark.as_deref(), &context.resampling())?;
         }
     }
     average(table);
@@ -61,7 +62,8 @@ fn is_within_chance(
     else {
         return Ok(false);
     };
-    if it.name == REFERENCE {
+    // Matches of other descriptors cannot be paired.
+    if it.name == REFERENCE || it.own.is_some() {
         return Ok(false);
     }
     let judged = &opened.corpus.judged;

@@ -39,7 +39,7 @@ pub(super) fn push_all(
             let column = format!("k={nth}{suffix}");
             match compensated(opened, nth, density) {
                 Ok(uncertainty) => {
-                    let scored = Scored { name: "", uncertainty: Ok(uncertainty) };
+                    let scored = Scored { name: "", uncertainty: Ok(uncertainty), own: None };
                     opened.push_auc(table, (row, &column), &scored, None, &resampling)?;
                 }
                 Err(err @ (Error::NoDensity { .. } | Error::Core(_))) => {

@@ -52,7 +52,7 @@ pub(super) fn run(
     }
     let scored: Vec<(&'static str, Vec<f64>)> = scored
         .into_iter()
-        .filter_map(|Scored { name, uncertainty }| Some((name, uncertainty.ok()?)))
+        .filter_map(|Scored { name, uncertainty, .. }| Some((name, uncertainty.ok()?)))
         .collect();
     let mut sheet = Sheet::default();
     match scene {

@@ -12,7 +12,7 @@ pub(super) fn run(table: &mut Table, subjects: &[Subject], context: Context<'_>)
     for (opened, verify) in open(table, subjects, "AUC-ROC", context)? {
         for scored in opened.score_all(&verify, context)? {
             let Ok(uncertainty) = &scored.uncertainty else { continue };
-            let summary = Evaluation::new(uncertainty, &opened.corpus.judged)?.summary()?;
+            let summary = Evaluation::new(uncertainty, scored.judged(&opened))?.summary()?;
             let row = format!("{}: {}", opened.row, scored.name);
             let values = [
                 ("base rate", Some(summary.base_rate)),
@@ -25,8 +25,12 @@ pub(super) fn run(table: &mut Table, subjects: &[Subject], context: Context<'_>)
             ];
             for (column, value) in values {
                 let cell = opened.cell(&row, column, 0.0);
+                let remarked = |cell: Cell| match scored.remark() {
+                    Some(remark) => cell.noted(remark),
+                    None => cell,
+                };
                 table.push(match value {
-                    Some(value) => Cell { value: Some(value.into()), ..cell },
+                    Some(value) => remarked(Cell { value: Some(value.into()), ..cell }),
                     None => {
                         Cell { value: None, ..cell.noted("undefined: all or no match is correct") }
                     }

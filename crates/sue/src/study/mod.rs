@@ -7,6 +7,7 @@ mod fusion;
 mod gallery;
 mod metrics;
 mod needs;
+mod noise;
 mod pr_curves;
 mod resampled;
 mod scatter;
@@ -29,6 +30,7 @@ pub use subject::Subject;
 use crate::{
     EstimatorChoice, Result,
     corpus::{LocalMethod, Sources},
+    net::Learned,
 };
 
 /// What to compute; the key `kind` of `[study]` chooses.
@@ -114,6 +116,19 @@ pub enum Study {
         /// Datasets with their encoders.
         subjects: Vec<Subject>,
     },
+    /// Whether predicted variances rise with a nuisance of generated places.
+    Noise {
+        /// The world, with the settings that stay.
+        world: String,
+        /// What the page calls the nuisance, unit included.
+        name: String,
+        /// The recipe's key.
+        key: String,
+        /// Its values, from least to most of the nuisance.
+        values: Vec<f64>,
+        /// The learned uncertainties.
+        learned: Vec<Learned>,
+    },
     /// Whether calibrated thresholds keep their promise on random splits.
     Calibration {
         /// Datasets with their encoders.
@@ -190,6 +205,10 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
             figure = Some(sweep::run(out, subjects, k, lambda, context)?);
         }
         Study::Spacing { subjects } => figure = Some(spacing::run(out, subjects, context)?),
+        Study::Noise { world, name, key, values, learned } => {
+            let dial = noise::Dial { world, name, key, values };
+            figure = Some(noise::run(out, dial, learned, context)?);
+        }
         Study::Calibration { subjects, splits, precision, risk } => {
             let plan = calibration::Plan { splits: *splits, precision: *precision, risk: *risk };
             calibration::run(out, subjects, plan, context)?;

@@ -40,7 +40,7 @@ pub(super) fn run(
             continue;
         }
         let corpus = part_of(&opened.corpus, &queries, &references)?;
-        let part = Opened { row: row.clone(), corpus };
+        let part = Opened { row: row.clone(), corpus, learned: Vec::new() };
         push_all(table, &part, &row, plan.nth, context)?;
     }
     Ok(())
@@ -94,6 +94,7 @@ fn part_of(corpus: &Corpus, queries: &[usize], references: &[usize]) -> Result<C
         poses: pick(&corpus.poses, references),
         query_poses: corpus.query_poses.as_ref().map(|poses| pick(poses, queries)),
         images: None,
+        variances: None,
         ..corpus.clone()
     })
 }

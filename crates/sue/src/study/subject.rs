@@ -11,7 +11,8 @@ use super::Context;
 use crate::{
     Error, EstimatorChoice, EstimatorSettings, InlierCounts, Inliers, Result, UncertaintyEstimator,
     corpus::{self, COUNTERPARTS, Corpus, LocalMethod, Verified, inlier_counts},
-    evaluate::Evaluation,
+    evaluate::{Evaluation, Judged},
+    net::Learned,
 };
 
 /// One dataset, the encoders that see it, and how its matches are verified.
@@ -25,6 +26,9 @@ pub struct Subject {
     /// Local methods for geometric verification; what takes long is left to few.
     #[serde(default)]
     pub verify: Vec<LocalMethod>,
+    /// Learned uncertainties; shown beside the first encoder.
+    #[serde(default)]
+    pub learned: Vec<Learned>,
 }
 
 /// One corpus with its row label.
@@ -32,6 +36,8 @@ pub(super) struct Opened {
     /// Row label.
     pub(super) row: String,
     pub(super) corpus: Corpus,
+    /// The same dataset under encoders that predict variances, or why there is none.
+    pub(super) learned: Vec<(Learned, Result<Corpus, String>)>,
 }
 
 /// The uncertainties of one method, or why it has none.
@@ -39,6 +45,8 @@ pub(super) struct Scored {
     /// Column label.
     pub(super) name: &'static str,
     pub(super) uncertainty: Result<Vec<f64>, String>,
+    /// The matches it is about, if the method has a retrieval of its own.
+    pub(super) own: Option<Judged>,
 }
 
 /// Opens all subjects; what is not at hand becomes an absent cell in `column`.
@@ -52,10 +60,12 @@ pub(super) fn open(
     for subject in subjects {
         let opened = corpus::open(&subject.dataset, &subject.encoders, &context.sources)?;
         let is_alone = subject.encoders.len() == 1;
+        let mut learned = learned_of(subject, context)?;
         for corpus in opened.corpora {
             let is_counterpart = COUNTERPARTS.iter().any(|it| it.name == subject.dataset);
             let row = if is_counterpart && is_alone { corpus.name.clone() } else { corpus.label() };
-            all.push((Opened { row, corpus }, subject.verify.clone()));
+            let learned = std::mem::take(&mut learned);
+            all.push((Opened { row, corpus, learned }, subject.verify.clone()));
         }
         for why in opened.missing {
             let cell = Cell::absent(&subject.dataset, column, why);
@@ -66,6 +76,20 @@ pub(super) fn open(
         }
     }
     Ok(all)
+}
+
+/// The subject's dataset under every learned encoder that it lists.
+fn learned_of(
+    subject: &Subject,
+    context: Context<'_>,
+) -> Result<Vec<(Learned, Result<Corpus, String>)>> {
+    let open = |&learned: &Learned| {
+        let name = [learned.key().to_owned()];
+        let mut opened = corpus::open(&subject.dataset, &name, &context.sources)?;
+        let missing = || opened.missing.join("; ");
+        Ok((learned, opened.corpora.pop().ok_or_else(missing)))
+    };
+    subject.learned.iter().map(open).collect()
 }
 
 /// Opens one subject with one encoder.
@@ -92,6 +116,19 @@ pub(super) const EFFICIENT: [EstimatorChoice; 8] = [
     EstimatorChoice::StatisticalUncertainty,
 ];
 
+impl Scored {
+    /// The matches it is about.
+    pub(super) fn judged<'a>(&'a self, opened: &'a Opened) -> &'a Judged {
+        self.own.as_ref().unwrap_or(&opened.corpus.judged)
+    }
+
+    /// What a reader must know of a method with its own retrieval.
+    pub(super) fn remark(&self) -> Option<String> {
+        let base_rate = self.own.as_ref()?.base_rate();
+        Some(format!("own descriptors; base rate {base_rate:.4}"))
+    }
+}
+
 impl Opened {
     /// The uncertainties of these estimators with the thesis' settings.
     pub(super) fn score(&self, choices: &[EstimatorChoice]) -> Result<Vec<Scored>> {
@@ -115,7 +152,7 @@ impl Opened {
             ) => Err(err.to_string()),
             Err(err) => return Err(err),
         };
-        Ok(Scored { name: prepared.name(), uncertainty })
+        Ok(Scored { name: prepared.name(), uncertainty, own: None })
     }
 
     /// The negative inliers of a local method.
@@ -127,16 +164,29 @@ impl Opened {
             }
             Verified::NotAtHand(why) => Err(why),
         };
-        Ok(Scored { name, uncertainty })
+        Ok(Scored { name, uncertainty, own: None })
     }
 
-    /// Everything about this corpus: efficient estimators, then verification.
+    /// The variances of learned encoders, each about its own matches.
+    pub(super) fn score_learned(&self) -> Result<Vec<Scored>> {
+        let score = |(learned, corpus): &(Learned, Result<Corpus, String>)| {
+            let (uncertainty, own) = match corpus {
+                Ok(corpus) => (Ok(corpus.variance(*learned)?), Some(corpus.judged.clone())),
+                Err(why) => (Err(why.clone()), None),
+            };
+            Ok(Scored { name: learned.name(), uncertainty, own })
+        };
+        self.learned.iter().map(score).collect()
+    }
+
+    /// Everything about this corpus: efficient estimators, learned ones, then verification.
     pub(super) fn score_all(
         &self,
         verify: &[LocalMethod],
         context: Context<'_>,
     ) -> Result<Vec<Scored>> {
         let mut scored = self.score(&EFFICIENT)?;
+        scored.extend(self.score_learned()?);
         for &method in verify {
             scored.push(self.verify(method, context)?);
         }
@@ -169,7 +219,7 @@ impl Opened {
                     continue;
                 }
             };
-            let evaluation = Evaluation::new(uncertainty, &self.corpus.judged)?;
+            let evaluation = Evaluation::new(uncertainty, scored.judged(self))?;
             table.push(match evaluation.auc_pr_interval(definition, resampling) {
                 Ok(it) => {
                     let cell = self.cell(row, column, it.estimate).defined(definition);

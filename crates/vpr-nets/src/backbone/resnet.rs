@@ -7,11 +7,11 @@ use burn::{
         BatchNorm, BatchNormConfig, Linear, LinearConfig, PaddingConfig2d,
         pool::{MaxPool2d, MaxPool2dConfig},
     },
-    tensor::{Device, Tensor, activation::relu, module::adaptive_avg_pool2d},
+    tensor::{Device, Tensor, module::adaptive_avg_pool2d},
 };
 use serde::{Deserialize, Serialize};
 
-use crate::layer::{Conv2d, Conv2dConfig};
+use crate::layer::{Activation, Conv2d, Conv2dConfig, conv_norm};
 
 /// Which residual block a network is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -170,7 +170,8 @@ impl ResNet {
     /// `n × 3 × height × width`.
     #[must_use]
     pub fn forward(&self, images: Tensor<4>) -> Tensor<4> {
-        let stem = self.maxpool.forward(relu(self.bn1.forward(self.conv1.forward(images))));
+        let stem = conv_norm(&self.conv1, &self.bn1, images, None, Activation::Relu);
+        let stem = self.maxpool.forward(stem);
         [&self.layer1, &self.layer2, &self.layer3, &self.layer4]
             .into_iter()
             .flatten()
@@ -188,16 +189,16 @@ impl ResNet {
 
 impl Residual {
     fn forward(&self, input: Tensor<4>) -> Tensor<4> {
-        let mut features = relu(self.bn1.forward(self.conv1.forward(input.clone())));
-        features = self.bn2.forward(self.conv2.forward(features));
-        if let (Some(conv3), Some(bn3)) = (&self.conv3, &self.bn3) {
-            features = bn3.forward(conv3.forward(relu(features)));
-        }
         let shortcut = match &self.downsample {
-            Some((convolution, norm)) => norm.forward(convolution.forward(input)),
-            None => input,
+            Some((conv, norm)) => conv_norm(conv, norm, input.clone(), None, Activation::None),
+            None => input.clone(),
         };
-        relu(features + shortcut)
+        let features = conv_norm(&self.conv1, &self.bn1, input, None, Activation::Relu);
+        let Some((conv3, bn3)) = self.conv3.as_ref().zip(self.bn3.as_ref()) else {
+            return conv_norm(&self.conv2, &self.bn2, features, Some(shortcut), Activation::Relu);
+        };
+        let features = conv_norm(&self.conv2, &self.bn2, features, None, Activation::Relu);
+        conv_norm(conv3, bn3, features, Some(shortcut), Activation::Relu)
     }
 }
 

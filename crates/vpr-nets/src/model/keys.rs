@@ -7,7 +7,7 @@ use crate::infer::Shapes;
 use crate::weights::Weights;
 
 /// A ResNet that was made a `Sequential` of its children, below `backbone.` or `backbone.net.`.
-pub(super) const SEQUENTIAL_RESNET: [(&str, &str); 6] = [
+pub const SEQUENTIAL_RESNET: [(&str, &str); 6] = [
     (r"^backbone\.(net\.)?0\.", "backbone.conv1."),
     (r"^backbone\.(net\.)?1\.", "backbone.bn1."),
     (r"^backbone\.(net\.)?4\.", "backbone.layer1."),

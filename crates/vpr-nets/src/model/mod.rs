@@ -14,6 +14,7 @@ use crate::Result;
 use crate::weights::{Report, Weights};
 
 pub use convolutional::{Trunk, boq_resnet50, convap, cosplace, gem_resnet50, mixvpr};
+pub use keys::SEQUENTIAL_RESNET;
 pub use netvlad::{NetVladHead, netvlad};
 pub use transformer::{boq_dinov2, cricavpr, salad};
 
