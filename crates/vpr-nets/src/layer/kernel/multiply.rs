@@ -63,52 +63,74 @@ pub(super) fn dispatch<T: WithSimd>(task: T) -> T::Output {
 #[inline(always)]
 pub(super) fn accumulate<S: Simd>(simd: S, rows: &[Lanes], panel: &[Lanes], sums: &mut Tile) {
     match (S::F32_LANES, S::REGISTER_COUNT) {
-        (16, _) => part::<S, 16, 1>(simd, rows, panel, sums, 0),
+        (16, _) => part::<S, 0, 16, 1>(simd, rows, panel, sums),
         (8, _) => {
-            for first in (0..TILE).step_by(4) {
-                part::<S, 4, 2>(simd, rows, panel, sums, first);
-            }
+            part::<S, 0, 4, 2>(simd, rows, panel, sums);
+            part::<S, 4, 4, 2>(simd, rows, panel, sums);
+            part::<S, 8, 4, 2>(simd, rows, panel, sums);
+            part::<S, 12, 4, 2>(simd, rows, panel, sums);
         }
         (4, 32..) => {
-            for first in (0..TILE).step_by(4) {
-                part::<S, 4, 4>(simd, rows, panel, sums, first);
-            }
+            part::<S, 0, 4, 4>(simd, rows, panel, sums);
+            part::<S, 4, 4, 4>(simd, rows, panel, sums);
+            part::<S, 8, 4, 4>(simd, rows, panel, sums);
+            part::<S, 12, 4, 4>(simd, rows, panel, sums);
         }
         (4, _) => {
-            for first in (0..TILE).step_by(2) {
-                part::<S, 2, 4>(simd, rows, panel, sums, first);
-            }
+            part::<S, 0, 2, 4>(simd, rows, panel, sums);
+            part::<S, 2, 2, 4>(simd, rows, panel, sums);
+            part::<S, 4, 2, 4>(simd, rows, panel, sums);
+            part::<S, 6, 2, 4>(simd, rows, panel, sums);
+            part::<S, 8, 2, 4>(simd, rows, panel, sums);
+            part::<S, 10, 2, 4>(simd, rows, panel, sums);
+            part::<S, 12, 2, 4>(simd, rows, panel, sums);
+            part::<S, 14, 2, 4>(simd, rows, panel, sums);
         }
         _ => plain(rows, panel, sums),
     }
 }
 
-/// `ROWS` rows of the tile from `first` on; `VECTORS` registers hold its 16 columns.
+/// `ROWS` rows of the tile from `FIRST` on; `VECTORS` registers hold its 16 columns.
+///
+/// Counted loops over constants, no closures: what is not unrolled at once leaves the registers.
 #[inline(always)]
-fn part<S: Simd, const ROWS: usize, const VECTORS: usize>(
+#[expect(clippy::needless_range_loop, reason = "see above")]
+fn part<S: Simd, const FIRST: usize, const ROWS: usize, const VECTORS: usize>(
     simd: S,
     rows: &[Lanes],
     panel: &[Lanes],
     sums: &mut Tile,
-    first: usize,
 ) {
     let mut partial = [[simd.splat_f32s(0.0); VECTORS]; ROWS];
-    for (partial, sums) in partial.iter_mut().zip(&sums[first..]) {
-        partial.copy_from_slice(&S::as_simd_f32s(sums).0[..VECTORS]);
+    for row in 0..ROWS {
+        for vector in 0..VECTORS {
+            partial[row][vector] = vector_of::<S>(&sums[FIRST + row], vector);
+        }
     }
-    for (row, lanes) in rows.iter().zip(panel) {
-        let lanes = S::as_simd_f32s(lanes).0;
-        let columns: [S::f32s; VECTORS] = std::array::from_fn(|i| lanes[i]);
-        for (partial, &value) in partial.iter_mut().zip(&row[first..]) {
-            let value = simd.splat_f32s(value);
-            for (partial, &columns) in partial.iter_mut().zip(&columns) {
-                *partial = simd.mul_add_e_f32s(value, columns, *partial);
+    for (weights, lanes) in rows.iter().zip(panel) {
+        let mut columns = [simd.splat_f32s(0.0); VECTORS];
+        for vector in 0..VECTORS {
+            columns[vector] = vector_of::<S>(lanes, vector);
+        }
+        for row in 0..ROWS {
+            let weight = simd.splat_f32s(weights[FIRST + row]);
+            for vector in 0..VECTORS {
+                partial[row][vector] =
+                    simd.mul_add_e_f32s(weight, columns[vector], partial[row][vector]);
             }
         }
     }
-    for (partial, sums) in partial.iter().zip(&mut sums[first..]) {
-        S::as_mut_simd_f32s(sums).0[..VECTORS].copy_from_slice(partial);
+    for row in 0..ROWS {
+        for vector in 0..VECTORS {
+            S::as_mut_simd_f32s(&mut sums[FIRST + row]).0[vector] = partial[row][vector];
+        }
     }
+}
+
+/// One register of 16 values.
+#[inline(always)]
+pub(super) fn vector_of<S: Simd>(lanes: &Lanes, vector: usize) -> S::f32s {
+    S::as_simd_f32s(lanes).0[vector]
 }
 
 /// The same without vector registers.

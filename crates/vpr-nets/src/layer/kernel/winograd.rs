@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::{
     finish::{Activation, Finish},
     geometry::Geometry,
-    multiply::{DEPTH_BLOCK, Lanes, Packed, TILE, Tile, accumulate, dispatch},
+    multiply::{DEPTH_BLOCK, Lanes, Packed, TILE, Tile, accumulate, dispatch, vector_of},
 };
 
 /// Outputs of one tile, per axis.
@@ -175,7 +175,7 @@ impl WithSimd for Piece<'_> {
     type Output = Vec<Lanes>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) -> Vec<Lanes> {
+    fn with_simd<S: Simd>(self, simd: S) -> Vec<Lanes> {
         let n = self.channels.len();
         let mut blocks = vec![[0.0; TILE]; N_FREQUENCIES * n];
         let [_, n_channels, height, width] = self.tiles.geometry.input;
@@ -189,7 +189,7 @@ impl WithSimd for Piece<'_> {
                 let plane = &plane[..height * width];
                 gather(plane, [height, width], [top, left], before, lane, &mut patch);
             }
-            frequencies_of_input(&mut patch);
+            frequencies_of_input(simd, &mut patch);
             for (frequency, lanes) in patch.iter().enumerate() {
                 blocks[frequency * n + index] = *lanes;
             }
@@ -231,53 +231,57 @@ fn gather(
 
 /// `Bᵀ d B`, in place.
 #[inline(always)]
-fn frequencies_of_input(patch: &mut [Lanes; N_FREQUENCIES]) {
+fn frequencies_of_input<S: Simd>(simd: S, patch: &mut [Lanes; N_FREQUENCIES]) {
     for row in 0..REACH {
-        let line = input_line(std::array::from_fn(|i| patch[row * REACH + i]));
-        for (i, lanes) in line.into_iter().enumerate() {
-            patch[row * REACH + i] = lanes;
-        }
+        input_line(simd, patch, row * REACH, 1);
     }
     for column in 0..REACH {
-        let line = input_line(std::array::from_fn(|i| patch[i * REACH + column]));
-        for (i, lanes) in line.into_iter().enumerate() {
-            patch[i * REACH + column] = lanes;
-        }
+        input_line(simd, patch, column, REACH);
     }
 }
 
-/// One axis of [`frequencies_of_input`].
+/// One axis of [`frequencies_of_input`]: six rows of lanes from `first` on, `step` apart.
 #[inline(always)]
-fn input_line(d: [Lanes; REACH]) -> [Lanes; REACH] {
-    let mut line = [[0.0; TILE]; REACH];
-    for i in 0..TILE {
-        let d = d.map(|lanes| lanes[i]);
-        let (even, odd) = (d[4] - 4.0 * d[2], d[3] - 4.0 * d[1]);
-        let (even_2, odd_2) = (d[4] - d[2], 2.0 * (d[3] - d[1]));
-        line[0][i] = 4.0 * d[0] - 5.0 * d[2] + d[4];
-        line[1][i] = even + odd;
-        line[2][i] = even - odd;
-        line[3][i] = even_2 + odd_2;
-        line[4][i] = even_2 - odd_2;
-        line[5][i] = 4.0 * d[1] - 5.0 * d[3] + d[5];
+fn input_line<S: Simd>(simd: S, patch: &mut [Lanes; N_FREQUENCIES], first: usize, step: usize) {
+    let (two, four, five) = (simd.splat_f32s(2.0), simd.splat_f32s(4.0), simd.splat_f32s(5.0));
+    for vector in 0..TILE / S::F32_LANES {
+        let mut d = [two; REACH];
+        for (i, d) in d.iter_mut().enumerate() {
+            *d = vector_of::<S>(&patch[first + i * step], vector);
+        }
+        let even = simd.sub_f32s(d[4], simd.mul_f32s(four, d[2]));
+        let odd = simd.sub_f32s(d[3], simd.mul_f32s(four, d[1]));
+        let even_2 = simd.sub_f32s(d[4], d[2]);
+        let odd_2 = simd.mul_f32s(two, simd.sub_f32s(d[3], d[1]));
+        let first_end = simd.sub_f32s(simd.mul_f32s(four, d[0]), simd.mul_f32s(five, d[2]));
+        let last_end = simd.sub_f32s(simd.mul_f32s(four, d[1]), simd.mul_f32s(five, d[3]));
+        let line = [
+            simd.add_f32s(first_end, d[4]),
+            simd.add_f32s(even, odd),
+            simd.sub_f32s(even, odd),
+            simd.add_f32s(even_2, odd_2),
+            simd.sub_f32s(even_2, odd_2),
+            simd.add_f32s(last_end, d[5]),
+        ];
+        for (i, line) in line.into_iter().enumerate() {
+            S::as_mut_simd_f32s(&mut patch[first + i * step]).0[vector] = line;
+        }
     }
-    line
 }
 
 /// One axis of `Aᵀ m A`.
 #[inline(always)]
-fn output_line(m: [Lanes; REACH]) -> [Lanes; STEP] {
-    let mut line = [[0.0; TILE]; STEP];
-    for i in 0..TILE {
-        let m = m.map(|lanes| lanes[i]);
-        let (sum, difference) = (m[1] + m[2], m[1] - m[2]);
-        let (sum_2, difference_2) = (m[3] + m[4], m[3] - m[4]);
-        line[0][i] = m[0] + sum + sum_2;
-        line[1][i] = difference + 2.0 * difference_2;
-        line[2][i] = sum + 4.0 * sum_2;
-        line[3][i] = difference + 8.0 * difference_2 + m[5];
-    }
-    line
+fn output_line<S: Simd>(simd: S, m: [S::f32s; REACH]) -> [S::f32s; STEP] {
+    let (two, four, eight) = (simd.splat_f32s(2.0), simd.splat_f32s(4.0), simd.splat_f32s(8.0));
+    let (sum, difference) = (simd.add_f32s(m[1], m[2]), simd.sub_f32s(m[1], m[2]));
+    let (sum_2, difference_2) = (simd.add_f32s(m[3], m[4]), simd.sub_f32s(m[3], m[4]));
+    let last = simd.add_f32s(difference, simd.mul_f32s(eight, difference_2));
+    [
+        simd.add_f32s(simd.add_f32s(m[0], sum), sum_2),
+        simd.add_f32s(difference, simd.mul_f32s(two, difference_2)),
+        simd.add_f32s(sum, simd.mul_f32s(four, sum_2)),
+        simd.add_f32s(last, m[5]),
+    ]
 }
 
 /// Some output channels of some panels.
@@ -313,7 +317,7 @@ impl WithSimd for Part<'_> {
                 }
             }
             for (index, sums) in sums.as_chunks::<N_FREQUENCIES>().0.iter().enumerate() {
-                self.store(self.panels.start + index, group, sums);
+                self.store(simd, self.panels.start + index, group, sums);
             }
         }
     }
@@ -322,18 +326,20 @@ impl WithSimd for Part<'_> {
 impl Part<'_> {
     /// Transforms the sums of 16 channels and 16 tiles back and stores what lies inside.
     #[inline(always)]
-    fn store(&mut self, panel: usize, group: usize, sums: &[Tile; N_FREQUENCIES]) {
+    fn store<S: Simd>(
+        &mut self,
+        simd: S,
+        panel: usize,
+        group: usize,
+        sums: &[Tile; N_FREQUENCIES],
+    ) {
         let n_out = self.tiles.geometry.n_out;
         let per_image = (self.groups.end * TILE).min(n_out) - self.groups.start * TILE;
         let last = ((panel + 1) * TILE).min(self.tiles.len());
         for channel in group * TILE..((group + 1) * TILE).min(n_out) {
-            let row = channel % TILE;
-            let half: [[Lanes; STEP]; REACH] = std::array::from_fn(|x| {
-                output_line(std::array::from_fn(|y| sums[y * REACH + x][row]))
-            });
-            let whole: [[Lanes; STEP]; STEP] =
-                std::array::from_fn(|y| output_line(std::array::from_fn(|x| half[x][y])));
-            let whole = whole.map(|line| line.map(|it| self.scaled(channel, it)));
+            let scale = self.finish.scale.map_or(1.0, |it| it[channel]);
+            let shift = self.finish.shift.map_or(0.0, |it| it[channel]);
+            let whole = outputs(simd, sums, channel % TILE, [scale, shift]);
             for (lane, tile) in (panel * TILE..last).enumerate() {
                 let (image, [top, left]) = self.tiles.place(tile);
                 let at = (image * n_out + channel) * self.tiles.output[0] * self.tiles.output[1];
@@ -342,16 +348,41 @@ impl Part<'_> {
             }
         }
     }
+}
 
-    #[inline(always)]
-    fn scaled(&self, channel: usize, mut lanes: Lanes) -> Lanes {
-        let scale = self.finish.scale.map_or(1.0, |it| it[channel]);
-        let shift = self.finish.shift.map_or(0.0, |it| it[channel]);
-        for lane in &mut lanes {
-            *lane = *lane * scale + shift;
+/// `scale · Aᵀ m A + shift` of one channel, `[row][column]`, a lane per tile.
+#[inline(always)]
+fn outputs<S: Simd>(
+    simd: S,
+    sums: &[Tile; N_FREQUENCIES],
+    channel: usize,
+    [scale, shift]: [f32; 2],
+) -> [[Lanes; STEP]; STEP] {
+    let (scale, shift) = (simd.splat_f32s(scale), simd.splat_f32s(shift));
+    let mut half = [[[0.0; TILE]; STEP]; REACH];
+    let mut whole = [[[0.0; TILE]; STEP]; STEP];
+    for vector in 0..TILE / S::F32_LANES {
+        for (x, half) in half.iter_mut().enumerate() {
+            let mut m = [scale; REACH];
+            for (y, m) in m.iter_mut().enumerate() {
+                *m = vector_of::<S>(&sums[y * REACH + x][channel], vector);
+            }
+            for (half, line) in half.iter_mut().zip(output_line(simd, m)) {
+                S::as_mut_simd_f32s(half).0[vector] = line;
+            }
         }
-        lanes
+        for (y, whole) in whole.iter_mut().enumerate() {
+            let mut m = [scale; REACH];
+            for (m, half) in m.iter_mut().zip(&half) {
+                *m = vector_of::<S>(&half[y], vector);
+            }
+            for (whole, line) in whole.iter_mut().zip(output_line(simd, m)) {
+                let value = simd.add_f32s(simd.mul_f32s(line, scale), shift);
+                S::as_mut_simd_f32s(whole).0[vector] = value;
+            }
+        }
     }
+    whole
 }
 
 /// Stores one lane's 4×4 outputs as far as they lie inside.
@@ -368,7 +399,10 @@ fn scatter(
     let n = STEP.min(width - left);
     for (row, line) in whole.iter().enumerate().take(height - top) {
         let start = (top + row) * width + left;
-        let mut values = line.map(|lanes| lanes[lane]);
+        let mut values = [0.0; STEP];
+        for (value, lanes) in values.iter_mut().zip(line) {
+            *value = lanes[lane];
+        }
         if let Some(residual) = finish.residual {
             for (value, residual) in values.iter_mut().zip(&residual[at + start..][..n]) {
                 *value += residual;
