@@ -10,6 +10,7 @@
 )]
 
 use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
 
 /// Output channels and columns of one tile.
 pub(super) const TILE: usize = 16;
@@ -33,13 +34,20 @@ pub(super) struct Packed {
 
 impl Packed {
     /// Packs the matrix whose element at `(row, depth)` is `value(row, depth)`.
-    pub(super) fn new(n_rows: usize, depth: usize, value: impl Fn(usize, usize) -> f32) -> Self {
+    pub(super) fn new(
+        n_rows: usize,
+        depth: usize,
+        value: impl Fn(usize, usize) -> f32 + Sync,
+    ) -> Self {
         let mut values = vec![[0.0; TILE]; n_rows.div_ceil(TILE) * depth];
-        for row in 0..n_rows {
-            for at in 0..depth {
-                values[row / TILE * depth + at][row % TILE] = value(row, at);
+        values.par_chunks_exact_mut(depth.max(1)).enumerate().for_each(|(group, values)| {
+            let rows = group * TILE..((group + 1) * TILE).min(n_rows);
+            for (at, lanes) in values.iter_mut().enumerate() {
+                for (lane, row) in lanes.iter_mut().zip(rows.clone()) {
+                    *lane = value(row, at);
+                }
             }
-        }
+        });
         Self { values, depth }
     }
 

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::{
     finish::{Activation, Finish},
     geometry::Geometry,
-    multiply::{DEPTH_BLOCK, Lanes, Packed, TILE, Tile, accumulate, dispatch, vector_of},
+    multiply::{DEPTH_BLOCK, Lanes, TILE, Tile, accumulate, dispatch, vector_of},
 };
 
 /// Outputs of one tile, per axis.
@@ -28,41 +28,65 @@ const N_FREQUENCIES: usize = REACH * REACH;
 /// Transformed input kept at a time, in bytes: well inside the last cache.
 const INPUT_BYTES: usize = 6 << 20;
 
-/// `G` of the algorithm: kernels to frequencies.
-const KERNEL: [[f64; 3]; REACH] = [
-    [0.25, 0.0, 0.0],
-    [-1.0 / 6.0, -1.0 / 6.0, -1.0 / 6.0],
-    [-1.0 / 6.0, 1.0 / 6.0, -1.0 / 6.0],
-    [1.0 / 24.0, 1.0 / 12.0, 1.0 / 6.0],
-    [1.0 / 24.0, -1.0 / 12.0, 1.0 / 6.0],
-    [0.0, 0.0, 1.0],
-];
-
-/// Kernels as frequencies, one packed `n_out × channels` matrix each.
+/// Kernels as frequencies: for every 16 output channels a matrix per frequency, a row per channel.
 #[derive(Clone, Debug)]
-pub(super) struct Frequencies(Vec<Packed>);
+pub(super) struct Frequencies {
+    /// `[frequency][channel]` of every group of output channels; rows that fill the last are zero.
+    groups: Vec<Vec<Lanes>>,
+    n_channels: usize,
+}
 
 impl Frequencies {
     /// Transforms `[n_out, channels, 3, 3]`, in f64.
     pub(super) fn new(weights: &[f32], n_out: usize, n_channels: usize) -> Self {
         let kernels = weights.as_chunks::<9>().0;
-        let frequency = |index: usize| {
-            let (rows, columns) = (KERNEL[index / REACH], KERNEL[index % REACH]);
-            Packed::new(n_out, n_channels, |out, channel| {
-                let kernel = &kernels[out * n_channels + channel];
-                let mut sum = 0.0;
-                for (row, kernel) in rows.iter().zip(kernel.as_chunks::<3>().0) {
-                    for (column, &value) in columns.iter().zip(kernel) {
-                        sum += row * column * f64::from(value);
+        let group = |group: usize| {
+            let mut lanes = vec![[0.0; TILE]; N_FREQUENCIES * n_channels];
+            for out in group * TILE..((group + 1) * TILE).min(n_out) {
+                let kernels = &kernels[out * n_channels..][..n_channels];
+                for (channel, kernel) in kernels.iter().enumerate() {
+                    for (frequency, value) in frequencies_of_kernel(kernel).into_iter().enumerate()
+                    {
+                        lanes[frequency * n_channels + channel][out % TILE] = value;
                     }
                 }
-                #[expect(clippy::cast_possible_truncation, reason = "weights are f32")]
-                let sum = sum as f32;
-                sum
-            })
+            }
+            lanes
         };
-        Self((0..N_FREQUENCIES).into_par_iter().map(frequency).collect())
+        let groups = (0..n_out.div_ceil(TILE)).into_par_iter().map(group).collect();
+        Self { groups, n_channels }
     }
+
+    /// 16 output channels at one frequency, from one channel to another.
+    fn group(&self, group: usize, frequency: usize, channels: Range<usize>) -> &[Lanes] {
+        &self.groups[group][frequency * self.n_channels..][channels]
+    }
+}
+
+/// `G g Gᵀ` of a kernel, row by row.
+fn frequencies_of_kernel(kernel: &[f32; 9]) -> [f32; N_FREQUENCIES] {
+    let mut half = [[0.0; REACH]; 3];
+    for (line, kernel) in half.iter_mut().zip(kernel.as_chunks::<3>().0) {
+        *line = kernel_line(kernel.map(f64::from));
+    }
+    let mut whole = [0.0; N_FREQUENCIES];
+    for column in 0..REACH {
+        let line = kernel_line([half[0][column], half[1][column], half[2][column]]);
+        for (row, value) in line.into_iter().enumerate() {
+            #[expect(clippy::cast_possible_truncation, reason = "weights are f32")]
+            let value = value as f32;
+            whole[row * REACH + column] = value;
+        }
+    }
+    whole
+}
+
+/// One axis of [`frequencies_of_kernel`]: the rows of `G` are (¼, 0, 0), (−⅙, ∓⅙, −⅙),
+/// (1/24, ±1/12, ⅙) and (0, 0, 1).
+fn kernel_line([a, b, c]: [f64; 3]) -> [f64; REACH] {
+    let (even, odd) = ((a + c) / -6.0, b / 6.0);
+    let (even_2, odd_2) = (a / 24.0 + c / 6.0, b / 12.0);
+    [0.25 * a, even - odd, even + odd, even_2 + odd_2, even_2 - odd_2, c]
 }
 
 /// The tiles of all outputs.
@@ -306,9 +330,9 @@ impl WithSimd for Part<'_> {
         let mut sums = vec![[[0.0; TILE]; TILE]; N_FREQUENCIES * n_panels];
         for group in self.groups.clone() {
             sums.fill([[0.0; TILE]; TILE]);
-            for (frequency, weights) in self.weights.0.iter().enumerate() {
+            for frequency in 0..N_FREQUENCIES {
                 for (block, channels) in self.transformed.channels.iter().enumerate() {
-                    let rows = weights.group(group, channels.clone());
+                    let rows = self.weights.group(group, frequency, channels.clone());
                     for panel in 0..n_panels {
                         let lanes = &self.transformed.blocks[panel * n_blocks + block];
                         let lanes = &lanes[frequency * rows.len()..][..rows.len()];
