@@ -70,7 +70,7 @@ impl<B: Backbone> Btl<B> {
 }
 
 impl<B: Backbone> Trainable for Btl<B> {
-    /// The Bayesian triplet loss over all pairs of a place with their hardest negative; 0 if the
+    /// The Bayesian triplet loss over all pairs of a place with their semi-hard negative; 0 if the
     /// batch has no pair.
     fn loss(&self, images: Tensor<4>, places: &[usize]) -> Tensor<1> {
         let (means, variances) = self.forward(images);
@@ -79,7 +79,7 @@ impl<B: Backbone> Trainable for Btl<B> {
         let values: Vec<f32> = means.clone().detach().into_data().iter::<f32>().collect();
         // The shape is that of the tensor the values are from.
         let rows = Array2::from_shape_vec((n, dimension), values).unwrap_or_default();
-        let triplets = mine(rows.view(), places, Negatives::Hard);
+        let triplets = mine(rows.view(), places, Negatives::SemiHard);
         if triplets.anchors.is_empty() {
             return (means.sum() + variances.sum()) * 0.0;
         }
