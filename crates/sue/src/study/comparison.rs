@@ -121,6 +121,11 @@ fn times(
             push(scored.name, timing::efficient(opened, *choice)?);
         }
     }
+    for (learned, corpus) in &opened.learned {
+        if let Ok(corpus) = corpus {
+            push(learned.name(), timing::predicted(corpus, *learned)?);
+        }
+    }
     for &method in verify {
         if let Ok(verifier) = method.open(context.sources.roots)?
             && let Some(value) = timing::verification(opened, &verifier)?

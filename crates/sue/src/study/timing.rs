@@ -3,7 +3,11 @@
 use std::time::{Duration, Instant};
 
 use super::subject::Opened;
-use crate::{EstimatorChoice, EstimatorSettings, Result, corpus::Verifier};
+use crate::{
+    EstimatorChoice, EstimatorSettings, Result,
+    corpus::{Corpus, Verifier},
+    net::Learned,
+};
 
 /// How long an estimator is repeated at least.
 const WINDOW: Duration = Duration::from_millis(50);
@@ -14,13 +18,22 @@ const PAIRS: usize = 5;
 pub(super) fn efficient(opened: &Opened, choice: EstimatorChoice) -> Result<f64> {
     let settings = EstimatorSettings::default();
     let prepared = choice.prepare(&settings, Some(&opened.corpus.poses))?;
+    per_query(opened.corpus.judged.len(), || prepared.estimate(&opened.corpus.retrieval))
+}
+
+/// Milliseconds per query from a network's variances to its uncertainties, on one thread; the
+/// variances come with the descriptors.
+pub(super) fn predicted(corpus: &Corpus, learned: Learned) -> Result<f64> {
+    per_query(corpus.judged.len(), || corpus.variance(learned))
+}
+
+fn per_query(n_queries: usize, mut estimate: impl FnMut() -> Result<Vec<f64>>) -> Result<f64> {
     let (start, mut rounds) = (Instant::now(), 0_u32);
     while start.elapsed() < WINDOW {
-        std::hint::black_box(prepared.estimate(&opened.corpus.retrieval)?);
+        std::hint::black_box(estimate()?);
         rounds += 1;
     }
-    let queries = f64::from(rounds) * opened.corpus.judged.len() as f64;
-    Ok(1e3 * start.elapsed().as_secs_f64() / queries)
+    Ok(1e3 * start.elapsed().as_secs_f64() / (f64::from(rounds) * n_queries as f64))
 }
 
 /// Milliseconds to verify one pair on one thread, features of both images included; the median of
