@@ -18,6 +18,7 @@ use burn::{
     },
     tensor::{Bytes, DType, Shape, TensorData},
 };
+use rayon::prelude::*;
 
 use super::kernel::{Activation, Finish, Geometry, Weights, weights_gradient};
 
@@ -66,20 +67,16 @@ fn tensor(values: Vec<f32>, shape: [usize; 4]) -> FlexTensor {
     FlexTensor::from_data(TensorData::from_bytes(bytes, Shape::from(shape), DType::F32))
 }
 
-/// `[a, b, …]` to `[b, a, …]`, each plane of `plane` values reordered by `order`.
-fn exchange(values: &[f32], [a, b]: [usize; 2], turned: bool) -> Vec<f32> {
+/// `[a, b, …]` to `[b, a, …]`, each plane turned by 180 degrees.
+fn exchanged_and_turned(values: &[f32], [a, b]: [usize; 2]) -> Vec<f32> {
     let plane = values.len() / (a * b);
-    let mut exchanged = Vec::with_capacity(values.len());
-    for inner in 0..b {
-        for outer in 0..a {
+    let mut exchanged = vec![0.0; values.len()];
+    exchanged.par_chunks_exact_mut(a * plane).enumerate().for_each(|(inner, planes)| {
+        for (outer, turned) in planes.chunks_exact_mut(plane).enumerate() {
             let plane = &values[(outer * b + inner) * plane..][..plane];
-            if turned {
-                exchanged.extend(plane.iter().rev());
-            } else {
-                exchanged.extend_from_slice(plane);
-            }
+            turned.iter_mut().zip(plane.iter().rev()).for_each(|(to, &from)| *to = from);
         }
-    }
+    });
     exchanged
 }
 
@@ -93,14 +90,13 @@ fn spread(
     let size = [(height - 1) * stride[0] + 1 + more[0], (width - 1) * stride[1] + 1 + more[1]];
     let n_planes = values.len() / (height * width);
     let mut spread = vec![0.0; n_planes * size[0] * size[1]];
-    let planes =
-        values.chunks_exact(height * width).zip(spread.chunks_exact_mut(size[0] * size[1]));
-    for (from, to) in planes {
+    let planes = spread.par_chunks_exact_mut(size[0] * size[1]);
+    planes.zip(values.par_chunks_exact(height * width)).for_each(|(to, from)| {
         for (row, from) in from.chunks_exact(width).enumerate() {
             let to = &mut to[row * stride[0] * size[1]..][..size[1]];
             to.iter_mut().step_by(stride[1]).zip(from).for_each(|(to, &from)| *to = from);
         }
-    }
+    });
     (spread, size)
 }
 
@@ -140,7 +136,7 @@ impl Convolve for Flex {
             after: std::array::from_fn(|axis| reach[axis].saturating_sub(forward.after[axis])),
             dilation: forward.dilation,
         };
-        let turned = exchange(values(&weights), [forward.n_out, n_channels], true);
+        let turned = exchanged_and_turned(values(&weights), [forward.n_out, n_channels]);
         let whole_size = whole.output().expect("the forward kernel fits, so the turned one does");
         let sums = Weights::default().convolve(&gradient, &turned, &whole, whole_size, PLAIN);
         let crop: [usize; 2] =

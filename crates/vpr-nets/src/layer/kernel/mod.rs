@@ -44,8 +44,7 @@ impl Weights {
             let new = || Frequencies::new(weights, n_out, geometry.input[1]);
             winograd::convolve(input, self.winograd.get_or_init(new), geometry, output, finish)
         } else {
-            let depth = geometry.depth();
-            let new = || Packed::new(n_out, depth, |row, at| weights[row * depth + at]);
+            let new = || Packed::new(weights, geometry.depth());
             direct::convolve(input, self.direct.get_or_init(new), geometry, output, finish)
         }
     }

@@ -33,18 +33,21 @@ pub(super) struct Packed {
 }
 
 impl Packed {
-    /// Packs the matrix whose element at `(row, depth)` is `value(row, depth)`.
-    pub(super) fn new(
-        n_rows: usize,
-        depth: usize,
-        value: impl Fn(usize, usize) -> f32 + Sync,
-    ) -> Self {
+    /// Packs a matrix given row by row, `depth` values each.
+    ///
+    /// A square of 16 × 16 values at a time: every line of the cache is read once and whole, also
+    /// where the rows lie a power of two apart.
+    pub(super) fn new(matrix: &[f32], depth: usize) -> Self {
+        let n_rows = matrix.len() / depth.max(1);
         let mut values = vec![[0.0; TILE]; n_rows.div_ceil(TILE) * depth];
-        values.par_chunks_exact_mut(depth.max(1)).enumerate().for_each(|(group, values)| {
-            let rows = group * TILE..((group + 1) * TILE).min(n_rows);
-            for (at, lanes) in values.iter_mut().enumerate() {
-                for (lane, row) in lanes.iter_mut().zip(rows.clone()) {
-                    *lane = value(row, at);
+        let groups = matrix.par_chunks(TILE * depth.max(1));
+        values.par_chunks_exact_mut(depth.max(1)).zip(groups).for_each(|(values, rows)| {
+            for (block, lanes) in values.chunks_mut(TILE).enumerate() {
+                for (row, values) in rows.chunks_exact(depth).enumerate() {
+                    let values = &values[block * TILE..][..lanes.len()];
+                    for (lanes, &value) in lanes.iter_mut().zip(values) {
+                        lanes[row] = value;
+                    }
                 }
             }
         });

@@ -30,8 +30,7 @@ pub(crate) fn weights_gradient(
         .par_chunks_exact(n_channels * height * width)
         .zip(gradient.par_chunks_exact(n_out * n_pixels))
         .map(|(image, gradient)| {
-            let packed = Packed::new(n_out, n_pixels, |row, at| gradient[row * n_pixels + at]);
-            (Planes::new(image, geometry, output), packed)
+            (Planes::new(image, geometry, output), Packed::new(gradient, n_pixels))
         })
         .collect();
     let n_panels = depth.div_ceil(TILE);
@@ -42,14 +41,14 @@ pub(crate) fn weights_gradient(
     });
     let sums: Vec<Vec<Tile>> = sums.collect();
     let mut values = vec![0.0; n_out * depth];
-    for (row, values) in values.chunks_exact_mut(depth).enumerate() {
+    values.par_chunks_exact_mut(depth).enumerate().for_each(|(row, values)| {
         for (panel, values) in values.chunks_mut(TILE).enumerate() {
             let block = &sums[panel / PANELS];
             let n = block.len() / n_out.div_ceil(TILE);
             let tile = &block[row / TILE * n + panel % PANELS];
             values.copy_from_slice(&tile[row % TILE][..values.len()]);
         }
-    }
+    });
     values
 }
 
