@@ -23,3 +23,7 @@ pub mod matching;
 pub mod orb;
 pub mod ransac;
 pub mod sift;
+
+/// A feature, matcher or estimator that gives other bits for the same input raises this number; whoever keeps results keeps
+/// it with them, so that they are not taken for those of another version.
+pub const NUMERICS: u32 = 1;

@@ -4,9 +4,11 @@ use std::{fs, path::PathBuf, time::UNIX_EPOCH};
 
 use vpr_core::{Error, Result, map::image_list_digest};
 
-/// Digest of a method and the images it was applied to: their paths, lengths and times of change.
+/// Digest of a method and the images it was applied to: their paths, lengths and times of change;
+/// and of the versions of what computes it.
 pub(super) fn key(method: &str, images: &[&PathBuf]) -> Result<String> {
-    let mut lines = vec![method.to_owned()];
+    let versions = format!("nets {} vision {}", vpr_nets::NUMERICS, vpr_vision::NUMERICS);
+    let mut lines = vec![method.to_owned(), versions];
     for path in images {
         let metadata = fs::metadata(path).map_err(Error::io(path.as_path()))?;
         let changed = metadata.modified().map_err(Error::io(path.as_path()))?;
