@@ -8,6 +8,7 @@ use burn::{
     tensor::{Device, Tensor},
 };
 use vpr_nets::{
+    layer::linear,
     loss::{LogVariance, SelfTeaching},
     model::{
         SEQUENTIAL_RESNET,
@@ -85,7 +86,7 @@ impl<B: Backbone> Stun<B> {
     #[must_use]
     pub fn forward(&self, images: Tensor<4>) -> (Tensor<2>, Tensor<2>) {
         let features = self.encoder.features(images);
-        (features.descriptors, self.var_head.forward(features.pooled))
+        (features.descriptors, linear(&self.var_head, features.pooled))
     }
 
     /// Images to descriptors and variances in use, exp(sigmoid(s)) of the head's output s, between

@@ -5,7 +5,7 @@ use burn::{
     nn::{Linear, LinearConfig},
     tensor::{Device, Tensor, activation::relu},
 };
-use vpr_nets::loss::positive;
+use vpr_nets::{layer::linear, loss::positive};
 
 /// Smallest standard deviation of a feature that is divided by.
 const FLOOR: f64 = 1e-3;
@@ -31,7 +31,7 @@ impl VarianceHead {
     /// Variances, positive.
     #[must_use]
     pub fn forward(&self, pooled: Tensor<2>) -> Tensor<2> {
-        positive(self.output.forward(relu(self.hidden.forward(pooled))))
+        positive(linear(&self.output, relu(linear(&self.hidden, pooled))))
     }
 
     /// The head for features like these, whose variances begin around `variance`. Without, the

@@ -1,4 +1,5 @@
-//! The steps of a transformer between its matrix products, over slices and on all threads.
+//! The steps of a network between its matrix products and convolutions, over slices and on all
+//! threads.
 //!
 //! burn-flex takes these in separate passes, most of them on one thread, and with the exponential
 //! and error functions of libm, value by value (`docs/performance.md`). Here each pass is one loop
@@ -12,10 +13,12 @@
 mod attention;
 mod gelu;
 mod norm;
+mod rows;
 
 pub(crate) use attention::{Heads, attend};
 pub(crate) use gelu::gelu;
 pub(crate) use norm::{Affine, add_scaled_in_place, layer_norm};
+pub(crate) use rows::{affine_map, standardize, unit};
 
 use pulp::Arch;
 use rayon::prelude::*;

@@ -4,7 +4,9 @@ mod conv2d;
 mod conv_norm;
 mod gradient;
 mod kernel;
+mod portable;
 
 pub use conv_norm::conv_norm;
 pub use conv2d::{Conv2d, Conv2dConfig};
 pub use kernel::Activation;
+pub use portable::{group_norm, linear, standardize, unit_rows};

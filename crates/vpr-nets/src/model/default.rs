@@ -18,7 +18,7 @@ use ndarray::Array2;
 use vpr_core::{Descriptors, Error, Result};
 
 use crate::{
-    layer::{Conv2d, Conv2dConfig},
+    layer::{Conv2d, Conv2dConfig, group_norm, linear, standardize, unit_rows},
     loss::SupervisedContrastive,
     train::{Affine, Trainable},
 };
@@ -131,7 +131,7 @@ impl DefaultEncoder {
     /// The projection of pooled features to unit descriptors.
     #[must_use]
     pub fn project(&self, pooled: Tensor<2>) -> Tensor<2> {
-        unit_rows(self.head.forward(pooled))
+        unit_rows(linear(&self.head, pooled))
     }
 
     /// Sets the projection so that these images' pooled features enter it with mean 0 and variance 1,
@@ -248,9 +248,12 @@ impl Trainable for DefaultEncoder {
 impl Trunk {
     /// Images as [`DefaultEncoder::forward`] takes them to `batch × pooled` features: every channel
     /// of the grid, row by row.
+    ///
+    /// Exposure and colour of the light are gone before the first layer: every channel enters with
+    /// mean 0 and variance 1.
     #[must_use]
     pub fn forward(&self, images: Tensor<4>) -> Tensor<2> {
-        let map = relu(self.stem.forward(standardized(images)));
+        let map = relu(self.stem.forward(standardize(images, 1e-4)));
         let map = self.stages.iter().fold(map, |map, stage| stage.forward(map));
         adaptive_avg_pool2d(self.reduce.forward(map), GRID).flatten(1, 3)
     }
@@ -288,18 +291,8 @@ impl Unit {
     }
 
     fn forward(&self, map: Tensor<4>) -> Tensor<4> {
-        self.norm.forward(self.conv.forward(map))
+        group_norm(&self.norm, self.conv.forward(map))
     }
-}
-
-/// Every channel of every image with mean 0 and variance 1: exposure and colour of the light are
-/// gone before the first layer.
-fn standardized(images: Tensor<4>) -> Tensor<4> {
-    let [batch, channels, height, width] = images.dims();
-    let flat = images.reshape([batch, channels, height * width]);
-    let centred = flat.clone() - flat.mean_dim(2);
-    let variance = centred.clone().square().mean_dim(2);
-    (centred / (variance + 1e-4).sqrt()).reshape([batch, channels, height, width])
 }
 
 /// What `forward` makes of images, a batch at a time.
@@ -319,11 +312,6 @@ fn rows(
     let n = images.len() / each;
     Array2::from_shape_vec((n, values.len() / n.max(1)), values)
         .map_err(|cause| Error::format("images", "shape", cause.to_string()))
-}
-
-fn unit_rows(rows: Tensor<2>) -> Tensor<2> {
-    let length = (rows.clone().square().sum_dim(1) + 1e-12).sqrt();
-    rows / length
 }
 
 #[cfg(test)]
