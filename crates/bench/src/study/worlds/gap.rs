@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 use vpr_core::{
-    Result,
+    Error, Result,
     metrics::bootstrap::Interval,
     table::{Cell, Provenance, Table},
 };
@@ -17,27 +17,39 @@ pub struct Domain {
     pub name: String,
     /// World of that kind.
     pub world: String,
+    /// Name of an earlier domain that it is compared with; none: it is a home itself.
+    pub home: Option<String>,
 }
 
 pub(super) fn run(table: &mut Table, domains: &[Domain], context: Context<'_>) -> Result<()> {
+    for (index, domain) in domains.iter().enumerate() {
+        if let Some(home) = domain.home.as_ref().filter(|&it| !is_before(it, &domains[..index])) {
+            let reason = format!("`{}` names `{home}`, which is no earlier domain", domain.name);
+            return Err(Error::format("domains", "home", reason));
+        }
+    }
     for runner in techniques(context)? {
-        let mut home: Option<Interval> = None;
+        let mut known: Vec<(&str, Interval)> = Vec::new();
         for domain in domains {
             let row = format!("domain: {}", domain.name);
             let Some(here) = recall(table, &row, &domain.world, &runner, context)? else {
                 continue;
             };
-            let Some(home) = &home else {
-                home = Some(here);
-                continue;
-            };
-            let (gap, low, high) = difference(home, &here);
-            let row = format!("domain gap: {} minus {}", domains[0].name, domain.name);
-            let cell = Cell::new(row, runner.0, gap, Provenance::Generated, 2);
-            table.push(cell.within(low, high, "Newcombe"));
+            let home = known.iter().find(|(name, _)| Some(*name) == domain.home.as_deref());
+            if let Some((home, there)) = home {
+                let (gap, low, high) = difference(there, &here);
+                let row = format!("domain gap: {home} minus {}", domain.name);
+                let cell = Cell::new(row, runner.0, gap, Provenance::Generated, 2);
+                table.push(cell.within(low, high, "Newcombe"));
+            }
+            known.push((&domain.name, here));
         }
     }
     Ok(())
+}
+
+fn is_before(name: &str, domains: &[Domain]) -> bool {
+    domains.iter().any(|domain| domain.name == name)
 }
 
 /// The difference of two independent shares with its interval (Newcombe 1998, method 10).

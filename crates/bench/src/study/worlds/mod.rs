@@ -32,7 +32,7 @@ pub struct Worlds {
     pub dials: Vec<Dial>,
     /// World of one key frame under many lights.
     pub light_stage: String,
-    /// Domains at equal viewpoint change; the first is the one others are compared with.
+    /// Domains at equal viewpoint change; each compared with the home it names.
     pub domains: Vec<Domain>,
     /// Real and generated sets to be told apart.
     pub likeness: Likeness,
