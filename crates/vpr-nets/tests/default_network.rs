@@ -4,6 +4,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use sha2::{Digest, Sha256};
 use vpr_core::Descriptors;
 use vpr_nets::{
     encode::{Options, by_name, encode_images, registry::Method},
@@ -51,6 +52,23 @@ fn descriptors_have_length_one_for_any_number_of_threads_and_images_at_a_time() 
     assert_eq!(of(3, 4), of(1, 4));
     for (a, b) in of(1, 4).as_slice().iter().zip(alone.as_slice()) {
         assert!((a - b).abs() < 1e-5, "{a} {b}");
+    }
+}
+
+/// What tables are made of must not move from one machine to the next, nor unnoticed from one
+/// version to the next.
+#[test]
+fn its_bits_are_those_of_this_version_on_every_processor_with_fused_products() {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        let network = by_name("default", None, &[]).unwrap();
+        let options = Options { threads: None, batch_size: 3, skip_bad: false };
+        let rows = encode_images(network.as_ref(), &images(7), &options).unwrap();
+        let bytes: Vec<u8> = rows.as_slice().iter().flat_map(|x| x.to_le_bytes()).collect();
+        let digest: String =
+            Sha256::digest(&bytes).iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+        let known = (2, "b7ad57318faeff47");
+        assert_eq!((vpr_nets::NUMERICS, digest.as_str()), known, "other bits are another version");
     }
 }
 

@@ -157,3 +157,18 @@ impl BoqBlock {
         self.norm_q.forward(queries + attended).expand([batch, count, dim])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::loss::check::{head_gradient, unit_rows};
+
+    #[test]
+    fn its_gradient_is_that_of_finite_differences() {
+        let config = BoqConfig::new(5).with_projected(16).with_queries(4).with_rows(3);
+        let head = config.init(&Device::flex().autodiff());
+        head_gradient(head, unit_rows(12, 5, 1), |head, rows| {
+            head.forward(rows.transpose().reshape([1, 5, 3, 4]))
+        });
+    }
+}

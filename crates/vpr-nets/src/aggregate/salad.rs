@@ -214,6 +214,23 @@ impl Reduction {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::loss::check::{head_gradient, unit_rows};
+
+    #[test]
+    fn its_gradient_is_that_of_finite_differences() {
+        let config = SaladConfig::new(6)
+            .with_clusters(3)
+            .with_cluster_dim(4)
+            .with_token_dim(5)
+            .with_hidden(8)
+            .with_dropout(0.0);
+        let head = config.init(&Device::flex().autodiff());
+        // Rows 0 to 11 are positions of the map, the last is the token.
+        head_gradient(head, unit_rows(13, 6, 1), |head, rows| {
+            let map = rows.clone().narrow(0, 0, 12).transpose().reshape([1, 6, 3, 4]);
+            head.forward(map, rows.narrow(0, 12, 1))
+        });
+    }
 
     #[test]
     fn every_cluster_and_every_position_has_its_mass() {

@@ -1,14 +1,14 @@
 //! Checks that every loss goes through.
 
 use burn::{
-    module::{Module, Param},
+    module::{Module, ModuleMapper, Param},
     optim::GradientsParams,
     tensor::{Device, Tensor, TensorData},
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::train::Optimizer;
+use crate::train::{Optimizer, seeded};
 
 /// Random rows of length one.
 pub(crate) fn unit_rows(n: usize, width: usize, seed: u64) -> (Vec<f32>, [usize; 2]) {
@@ -53,6 +53,42 @@ pub(crate) fn gradient(
             "entry {index}: {} against {expected}",
             found[index]
         );
+    }
+}
+
+/// [`gradient`] of what `forward` makes of rows, along one direction of its output. `head` lies on a
+/// device that records gradients; its weights are drawn anew.
+pub(crate) fn head_gradient<M: Module>(
+    head: M,
+    rows: (Vec<f32>, [usize; 2]),
+    forward: impl Fn(&M, Tensor<2>) -> Tensor<2>,
+) {
+    let recording = seeded(head, 3).map(&mut WithoutBias);
+    let plain = recording.clone().valid();
+    gradient(rows, |rows| {
+        let head = if rows.is_require_grad() { &recording } else { &plain };
+        let device = rows.device();
+        let descriptors = forward(head, rows);
+        let (direction, shape) = unit_rows(1, descriptors.dims()[1], 2);
+        let direction = Tensor::from_data(TensorData::new(direction, shape), &device);
+        (descriptors * direction).sum()
+    });
+}
+
+/// Takes away first biases, which a generator of the whole process draws, all within ±½; vectors of
+/// ones stay.
+struct WithoutBias;
+
+impl ModuleMapper for WithoutBias {
+    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        if D > 1 {
+            return param;
+        }
+        param.map(|old| {
+            let (tracked, device) = (old.is_require_grad(), old.device());
+            let rounded = old.detach().round().into_data();
+            Tensor::from_data(rounded, &device).set_require_grad(tracked)
+        })
     }
 }
 
