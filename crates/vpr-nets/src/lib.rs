@@ -36,6 +36,6 @@ pub fn device() -> burn::tensor::Device {
     burn::tensor::Device::flex()
 }
 
-/// A network or kernel that gives other bits for the same input raises this number; whoever keeps results keeps
-/// it with them, so that they are not taken for those of another version.
+/// Version of the numbers: raised when a network or kernel gives other bits for the same input.
+/// Whoever keeps results keeps it with them, so that they are not taken for another version's.
 pub const NUMERICS: u32 = 2;

@@ -24,6 +24,7 @@ pub mod orb;
 pub mod ransac;
 pub mod sift;
 
-/// A feature, matcher or estimator that gives other bits for the same input raises this number; whoever keeps results keeps
-/// it with them, so that they are not taken for those of another version.
+/// Version of the numbers: raised when a feature, matcher or estimator gives other bits for the
+/// same input. Whoever keeps results keeps it with them, so that they are not taken for another
+/// version's.
 pub const NUMERICS: u32 = 1;

@@ -2,8 +2,8 @@
 
 use super::{Affine, for_rows, sum};
 
-/// Brings runs of `width` values to mean 0 and variance 1. A run has as many channels as come
-/// in `parts` of it, each scaled and shifted; runs repeat the channels of `affine` in order.
+/// Brings runs of `width` values to mean 0 and variance 1. A run is `parts` channels beside each
+/// other, each then scaled and shifted; the channels of `affine` repeat over all runs.
 pub(crate) fn standardize(x: &[f32], width: usize, parts: usize, affine: Affine<'_>) -> Vec<f32> {
     let mut result = vec![0.0; x.len()];
     let plane = width / parts;

@@ -16,10 +16,15 @@ use crate::{
 };
 
 /// Rows through a linear layer: `n × from` to `n × to`.
+///
+/// # Panics
+///
+/// If the rows have another length than the layer takes.
 #[must_use]
 pub fn linear(layer: &Linear, rows: Tensor<2>) -> Tensor<2> {
-    let [n, _] = rows.dims();
-    let [_, to] = layer.weight.dims();
+    let [n, length] = rows.dims();
+    let [from, to] = layer.weight.dims();
+    assert_eq!(length, from, "values of a row");
     let values = || {
         let weight = Plain::new(&layer.weight.val())?;
         let bias = match &layer.bias {
@@ -34,10 +39,15 @@ pub fn linear(layer: &Linear, rows: Tensor<2>) -> Tensor<2> {
     }
 }
 
-/// Group normalisation of `images × channels × height × width`.
+/// Group normalisation of `images × channels × height × width` (Wu and He, ECCV 2018).
+///
+/// # Panics
+///
+/// If the map has another number of channels than the layer takes.
 #[must_use]
 pub fn group_norm(norm: &GroupNorm, map: Tensor<4>) -> Tensor<4> {
     let shape @ [_, channels, height, width] = map.dims();
+    assert_eq!(channels, norm.num_channels, "channels of a map");
     let per_group = channels / norm.num_groups;
     let values = || {
         let gamma = Plain::new(&norm.gamma.as_ref()?.val())?;
@@ -54,7 +64,8 @@ pub fn group_norm(norm: &GroupNorm, map: Tensor<4>) -> Tensor<4> {
     }
 }
 
-/// Every channel of every image with mean 0 and variance 1; `epsilon` is added to the variance.
+/// Every channel of every image (`images × channels × height × width`) with mean 0 and variance 1;
+/// `epsilon` is added to the variance.
 #[must_use]
 pub fn standardize(images: Tensor<4>, epsilon: f32) -> Tensor<4> {
     let shape @ [batch, channels, height, width] = images.dims();
@@ -69,7 +80,7 @@ pub fn standardize(images: Tensor<4>, epsilon: f32) -> Tensor<4> {
     (centred / (variance + epsilon).sqrt()).reshape(shape)
 }
 
-/// Rows divided by √(Σ x² + 1e-12).
+/// Rows, `n × length`, divided by √(Σ x² + 1e-12).
 #[must_use]
 pub fn unit_rows(rows: Tensor<2>) -> Tensor<2> {
     const FLOOR: f32 = 1e-12;

@@ -22,12 +22,7 @@ pub struct Domain {
 }
 
 pub(super) fn run(table: &mut Table, domains: &[Domain], context: Context<'_>) -> Result<()> {
-    for (index, domain) in domains.iter().enumerate() {
-        if let Some(home) = domain.home.as_ref().filter(|&it| !is_before(it, &domains[..index])) {
-            let reason = format!("`{}` names `{home}`, which is no earlier domain", domain.name);
-            return Err(Error::format("domains", "home", reason));
-        }
-    }
+    check_homes(domains)?;
     for runner in techniques(context)? {
         let mut known: Vec<(&str, Interval)> = Vec::new();
         for domain in domains {
@@ -48,8 +43,16 @@ pub(super) fn run(table: &mut Table, domains: &[Domain], context: Context<'_>) -
     Ok(())
 }
 
-fn is_before(name: &str, domains: &[Domain]) -> bool {
-    domains.iter().any(|domain| domain.name == name)
+/// Refuses a home that is no earlier domain.
+fn check_homes(domains: &[Domain]) -> Result<()> {
+    for (index, domain) in domains.iter().enumerate() {
+        let Some(home) = &domain.home else { continue };
+        if !domains[..index].iter().any(|earlier| earlier.name == *home) {
+            let reason = format!("`{}` names `{home}`, which is no earlier domain", domain.name);
+            return Err(Error::format("domains", "home", reason));
+        }
+    }
+    Ok(())
 }
 
 /// The difference of two independent shares with its interval (Newcombe 1998, method 10).
@@ -65,6 +68,20 @@ mod tests {
     use vpr_core::metrics::bootstrap::{Z_95, wilson_interval};
 
     use super::*;
+
+    #[test]
+    fn a_home_comes_before_those_compared_with_it() {
+        let domain = |name: &str, home: Option<&str>| Domain {
+            name: name.into(),
+            world: "world/street".into(),
+            home: home.map(Into::into),
+        };
+        let domains = [domain("street", None), domain("rail", Some("street"))];
+        check_homes(&domains).unwrap();
+        let err = check_homes(&domains[1..]).unwrap_err().to_string();
+        assert!(err.contains("`rail` names `street`"), "{err}");
+        assert!(check_homes(&[domain("rail", Some("rail"))]).is_err());
+    }
 
     #[test]
     fn the_difference_of_shares_has_newcombes_interval() {
