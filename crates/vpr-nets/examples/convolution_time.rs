@@ -10,12 +10,13 @@ use std::{collections::HashMap, io::BufRead, time::Instant};
 use burn::{
     module::Module,
     nn::{PaddingConfig2d, loss::CrossEntropyLossConfig},
-    optim::{AdamConfig, GradientsParams},
+    optim::GradientsParams,
     tensor::{Device, Distribution, Int, Tensor},
 };
 use vpr_nets::{
     backbone::{ResNetConfig, resnet::Block},
     layer::Conv2dConfig,
+    train::Optimizer,
 };
 
 type Case = Box<dyn FnMut()>;
@@ -75,7 +76,7 @@ fn training_step(images: usize) -> Case {
     let device = Device::flex().autodiff();
     let config = ResNetConfig::new(Block::Basic, [2, 2, 2, 2]).with_classes(Some(10));
     let mut network = Some(config.init(&device));
-    let mut adam = AdamConfig::new().init();
+    let mut adam = Optimizer::Adam.init();
     let input = noise([images, 3, 96, 96], &device);
     let classes: Vec<i64> = (0..images).map(|it| i64::try_from(it % 10).unwrap_or(0)).collect();
     let classes = Tensor::<1, Int>::from_data(&classes[..], &device);

@@ -39,6 +39,41 @@ impl Plain {
     }
 }
 
+/// A contiguous f32 tensor on the CPU whose values are written in place.
+#[derive(Debug)]
+pub(crate) struct PlainMut {
+    tensor: FlexTensor,
+    device: Device,
+}
+
+impl PlainMut {
+    /// Takes the tensor; its values are copied if others hold them too.
+    ///
+    /// # Panics
+    ///
+    /// Where [`Plain::new`] gives `None`.
+    pub(crate) fn new<const D: usize>(tensor: Tensor<D>) -> Self {
+        let device = tensor.device();
+        let Plain(flat) = Plain::new(&tensor).expect("an f32 tensor in memory");
+        drop(tensor);
+        // A view of a part of the memory gets memory of its own.
+        let is_whole = flat.layout().start_offset() == 0;
+        let tensor = if is_whole { flat } else { FlexTensor::from_data(flat.into_data()) };
+        Self { tensor, device }
+    }
+
+    /// The values in row-major order.
+    pub(crate) fn values(&mut self) -> &mut [f32] {
+        let n = self.tensor.layout().num_elements();
+        &mut self.tensor.storage_mut::<f32>()[..n]
+    }
+
+    /// The tensor with its new values.
+    pub(crate) fn tensor<const D: usize>(self) -> Tensor<D> {
+        Tensor::from_data(self.tensor.into_data(), &self.device)
+    }
+}
+
 /// A tensor of these values.
 pub(crate) fn tensor<const D: usize>(
     values: Vec<f32>,

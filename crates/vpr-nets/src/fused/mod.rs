@@ -10,13 +10,13 @@
     reason = "only what is inlined into the dispatch is compiled for its registers"
 )]
 
-mod attention;
 mod gelu;
+mod moments;
 mod norm;
 mod rows;
 
-pub(crate) use attention::{Heads, attend};
 pub(crate) use gelu::gelu;
+pub(crate) use moments::{Moments, Sets, Sharing};
 pub(crate) use norm::{Affine, add_scaled_in_place, layer_norm};
 pub(crate) use rows::{affine_map, standardize, unit};
 
@@ -59,7 +59,7 @@ fn sum(values: &[f32], f: impl Fn(f32) -> f32) -> f32 {
 ///
 /// x = n ln 2 + r with |r| ≤ ln 2 / 2; the power of two is put together from its bits.
 #[inline(always)]
-fn exp_of_negative(x: f32) -> f32 {
+pub(crate) fn exp_of_negative(x: f32) -> f32 {
     /// Adding it rounds to a whole number, which then stands in the lowest bits.
     const ROUND: f32 = 12_582_912.0;
     /// ln 2 in two parts, the first with zeros at its end.

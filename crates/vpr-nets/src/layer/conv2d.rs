@@ -274,7 +274,7 @@ impl Conv2d {
 }
 
 /// Whether a tensor lies in memory, recorded for gradients or not.
-fn is_recorded_here(kind: &DispatchTensorKind) -> bool {
+pub(super) fn is_recorded_here(kind: &DispatchTensorKind) -> bool {
     let inner: &DispatchTensorKind =
         if let DispatchTensorKind::Autodiff(inner) = kind { inner } else { kind };
     matches!(inner, DispatchTensorKind::Flex(_))

@@ -5,7 +5,7 @@ use burn::{
     tensor::{Tensor, activation::relu},
 };
 
-use super::{Activation, Conv2d, conv2d::Last};
+use super::{Activation, Conv2d, conv2d::Last, normalize::batch_norm};
 use crate::plain::Plain;
 
 /// `activation(norm(conv(input)) + residual)`.
@@ -38,7 +38,7 @@ pub fn conv_norm(
         }
         return output;
     }
-    let mut output = norm.forward(conv.forward(input));
+    let mut output = batch_norm(norm, conv.forward(input));
     if let Some(residual) = residual {
         output = output + residual;
     }

@@ -57,14 +57,16 @@ pub(super) trait Convolve: Backend {
 const PLAIN: Finish<'static> =
     Finish { scale: None, shift: None, residual: None, activation: Activation::None };
 
-fn values(tensor: &FlexTensor) -> &[f32] {
+/// The values of a contiguous tensor.
+pub(super) fn values(tensor: &FlexTensor) -> &[f32] {
     let layout = tensor.layout();
     &tensor.storage::<f32>()[layout.start_offset()..][..layout.num_elements()]
 }
 
-fn tensor(values: Vec<f32>, shape: [usize; 4]) -> FlexTensor {
+/// A tensor of these values.
+pub(super) fn tensor(values: Vec<f32>, shape: impl Into<Shape>) -> FlexTensor {
     let bytes = Bytes::from_elems(values);
-    FlexTensor::from_data(TensorData::from_bytes(bytes, Shape::from(shape), DType::F32))
+    FlexTensor::from_data(TensorData::from_bytes(bytes, shape.into(), DType::F32))
 }
 
 /// `[a, b, …]` to `[b, a, …]`, each plane turned by 180 degrees.
@@ -241,7 +243,7 @@ impl<B: Convolve, C: CheckpointStrategy> Convolve for Autodiff<B, C> {
 }
 
 /// Gradients of gradients are not needed by any loss here.
-fn unrecorded<B: Convolve, C: CheckpointStrategy>(
+pub(super) fn unrecorded<B: Backend, C: CheckpointStrategy>(
     tensor: FloatTensor<B>,
 ) -> FloatTensor<Autodiff<B, C>> {
     <Autodiff<B, C> as burn::backend::AutodiffBackend>::from_inner(tensor)

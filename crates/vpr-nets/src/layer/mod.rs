@@ -4,9 +4,11 @@ mod conv2d;
 mod conv_norm;
 mod gradient;
 mod kernel;
+mod normalize;
 mod portable;
 
 pub use conv_norm::conv_norm;
 pub use conv2d::{Conv2d, Conv2dConfig};
 pub use kernel::Activation;
+pub(crate) use kernel::{Heads, attend, product};
 pub use portable::{group_norm, linear, standardize, unit_rows};

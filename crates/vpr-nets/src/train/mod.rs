@@ -1,5 +1,6 @@
 //! Training: optimisers, schedules, checkpoints, weights drawn from a seed, the loop, and whitening.
 
+mod adam;
 mod checkpoint;
 mod descent;
 mod optimizer;

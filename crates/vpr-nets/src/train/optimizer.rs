@@ -1,8 +1,10 @@
 //! Which optimiser, as data.
 
-use burn::optim::{AdamConfig, AdamWConfig, ModuleOptimizer};
+use burn::optim::ModuleOptimizer;
 
-/// An optimiser and its numbers; burn's implementations.
+use super::adam::Adam;
+
+/// An optimiser and its numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Optimizer {
     /// Adam (Kingma and Ba 2015), β 0.9 and 0.999, ε 1e-8.
@@ -18,12 +20,10 @@ impl Optimizer {
     /// An optimiser without a past.
     #[must_use]
     pub fn init(&self) -> ModuleOptimizer {
-        match *self {
-            Self::Adam => AdamConfig::new().with_epsilon(1e-8).init(),
-            Self::AdamW { decay } => {
-                AdamWConfig::new().with_epsilon(1e-8).with_weight_decay(decay).init()
-            }
-        }
+        ModuleOptimizer::from(match *self {
+            Self::Adam => Adam { decay: None },
+            Self::AdamW { decay } => Adam { decay: Some(decay) },
+        })
     }
 }
 

@@ -8,7 +8,8 @@ use burn::tensor::ops::AttentionModuleOptions;
 use burn::tensor::{Device, Tensor};
 
 use super::{DinoV2Config, NORM_EPSILON};
-use crate::fused::{self, Affine, Heads};
+use crate::fused::{self, Affine};
+use crate::layer::{self, Heads};
 use crate::plain::{Plain, tensor};
 
 /// One block; tokens `batch × n × dim` keep their shape.
@@ -97,20 +98,18 @@ impl Block {
     /// One block on the tokens `x`, a row of `dim` values each.
     fn step(&self, own: &Vectors, x: &mut [f32], [batch, tokens, dim]: [usize; 3]) -> Option<()> {
         let normed = fused::layer_norm(x, affine(&own.norm1));
-        let qkv = product(normed, &self.attn.qkv)?;
+        let qkv = product(&normed, &self.attn.qkv)?;
         let count = self.attn.heads;
         let heads = Heads { batch, tokens, count, size: dim / count };
-        let attended = fused::attend(qkv.values(), own.qkv_bias.values(), heads);
-        let attended = product(attended, &self.attn.proj)?;
-        let (bias, scale) = (own.proj_bias.values(), own.ls1.values());
-        fused::add_scaled_in_place(x, attended.values(), bias, scale);
+        let attended = layer::attend(&qkv, own.qkv_bias.values(), heads);
+        let attended = product(&attended, &self.attn.proj)?;
+        fused::add_scaled_in_place(x, &attended, own.proj_bias.values(), own.ls1.values());
 
         let normed = fused::layer_norm(x, affine(&own.norm2));
-        let inner = product(normed, &self.mlp.fc1)?;
-        let inner = fused::gelu(inner.values(), own.fc1_bias.values());
-        let outer = product(inner, &self.mlp.fc2)?;
-        let (bias, scale) = (own.fc2_bias.values(), own.ls2.values());
-        fused::add_scaled_in_place(x, outer.values(), bias, scale);
+        let inner = product(&normed, &self.mlp.fc1)?;
+        let inner = fused::gelu(&inner, own.fc1_bias.values());
+        let outer = product(&inner, &self.mlp.fc2)?;
+        fused::add_scaled_in_place(x, &outer, own.fc2_bias.values(), own.ls2.values());
         Some(())
     }
 }
@@ -120,13 +119,11 @@ fn affine(norm: &[Plain; 2]) -> Affine<'_> {
     Affine { gamma: gamma.values(), beta: beta.values(), epsilon: NORM_EPSILON }
 }
 
-/// Rows times the weights of a layer, without its bias.
-fn product(rows: Vec<f32>, layer: &Linear) -> Option<Plain> {
-    let weight = layer.weight.val();
-    let width = weight.dims()[0];
-    let n_rows = rows.len() / width;
-    let rows = tensor::<2>(rows, [n_rows, width], &weight.device());
-    Plain::new(&rows.matmul(weight))
+/// Rows times the weights of a linear layer, without its bias.
+fn product(rows: &[f32], linear: &Linear) -> Option<Vec<f32>> {
+    let weight = linear.weight.val();
+    let [depth, _] = weight.dims();
+    Some(layer::product(rows, Plain::new(&weight)?.values(), depth))
 }
 
 /// Self-attention with one projection for queries, keys and values.

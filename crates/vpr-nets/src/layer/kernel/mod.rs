@@ -2,20 +2,24 @@
 //! with a kernel of its own and stores, normalises and activates in separate passes
 //! (`docs/performance.md`).
 
+mod attention;
 mod direct;
 mod finish;
 mod geometry;
 mod lower;
 mod multiply;
+mod product;
 mod weights_gradient;
 mod winograd;
 
 use std::sync::OnceLock;
 
+pub(crate) use attention::{Heads, attend};
 pub use finish::Activation;
 pub(crate) use finish::Finish;
 pub(crate) use geometry::Geometry;
 use multiply::Packed;
+pub(crate) use product::product;
 pub(crate) use weights_gradient::weights_gradient;
 use winograd::Frequencies;
 
@@ -142,6 +146,27 @@ mod tests {
                 dilation: [1, 1],
             };
             prop_assert!(relative_error(&geometry, seed) < 1e-5);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn a_product_equals_the_definition(
+            (n, depth, width) in (1usize..40, 1usize..600, 1usize..90),
+            seed in 0u32..1000,
+        ) {
+            let (rows, matrix) = (noise(n * depth, seed), noise(depth * width, seed + 1));
+            let fast = product(&rows, &matrix, depth);
+            prop_assert_eq!(fast.len(), n * width);
+            for (index, &fast) in fast.iter().enumerate() {
+                let row = &rows[index / width * depth..][..depth];
+                let column = matrix.iter().skip(index % width).step_by(width);
+                let exact: f64 =
+                    row.iter().zip(column).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum();
+                prop_assert!((f64::from(fast) - exact).abs() < 1e-4, "{index}");
+            }
         }
     }
 

@@ -76,10 +76,9 @@ pub(super) fn accumulate<S: Simd>(simd: S, rows: &[Lanes], panel: &[Lanes], sums
     match (S::F32_LANES, S::REGISTER_COUNT) {
         (16, _) => part::<S, 0, 16, 1>(simd, rows, panel, sums),
         (8, _) => {
-            part::<S, 0, 4, 2>(simd, rows, panel, sums);
-            part::<S, 4, 4, 2>(simd, rows, panel, sums);
-            part::<S, 8, 4, 2>(simd, rows, panel, sums);
-            part::<S, 12, 4, 2>(simd, rows, panel, sums);
+            part::<S, 0, 6, 2>(simd, rows, panel, sums);
+            part::<S, 6, 5, 2>(simd, rows, panel, sums);
+            part::<S, 11, 5, 2>(simd, rows, panel, sums);
         }
         (4, 32..) => {
             part::<S, 0, 4, 4>(simd, rows, panel, sums);

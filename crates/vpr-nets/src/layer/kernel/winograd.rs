@@ -40,20 +40,8 @@ impl Frequencies {
     /// Transforms `[n_out, channels, 3, 3]`, in f64.
     pub(super) fn new(weights: &[f32], n_out: usize, n_channels: usize) -> Self {
         let kernels = weights.as_chunks::<9>().0;
-        let group = |group: usize| {
-            let mut lanes = vec![[0.0; TILE]; N_FREQUENCIES * n_channels];
-            for out in group * TILE..((group + 1) * TILE).min(n_out) {
-                let kernels = &kernels[out * n_channels..][..n_channels];
-                for (channel, kernel) in kernels.iter().enumerate() {
-                    for (frequency, value) in frequencies_of_kernel(kernel).into_iter().enumerate()
-                    {
-                        lanes[frequency * n_channels + channel][out % TILE] = value;
-                    }
-                }
-            }
-            lanes
-        };
-        let groups = (0..n_out.div_ceil(TILE)).into_par_iter().map(group).collect();
+        let groups = kernels.par_chunks(TILE * n_channels.max(1)).take(n_out.div_ceil(TILE));
+        let groups = groups.map(|kernels| dispatch(Kernels { kernels, n_channels })).collect();
         Self { groups, n_channels }
     }
 
@@ -63,30 +51,68 @@ impl Frequencies {
     }
 }
 
-/// `G g Gᵀ` of a kernel, row by row.
-fn frequencies_of_kernel(kernel: &[f32; 9]) -> [f32; N_FREQUENCIES] {
-    let mut half = [[0.0; REACH]; 3];
-    for (line, kernel) in half.iter_mut().zip(kernel.as_chunks::<3>().0) {
-        *line = kernel_line(kernel.map(f64::from));
-    }
-    let mut whole = [0.0; N_FREQUENCIES];
-    for column in 0..REACH {
-        let line = kernel_line([half[0][column], half[1][column], half[2][column]]);
-        for (row, value) in line.into_iter().enumerate() {
-            #[expect(clippy::cast_possible_truncation, reason = "weights are f32")]
-            let value = value as f32;
-            whole[row * REACH + column] = value;
-        }
-    }
-    whole
+/// The kernels of up to 16 output channels, `[channel out][channel in]`.
+struct Kernels<'a> {
+    kernels: &'a [[f32; 9]],
+    n_channels: usize,
 }
 
-/// One axis of [`frequencies_of_kernel`]: the rows of `G` are (¼, 0, 0), (−⅙, ∓⅙, −⅙),
-/// (1/24, ±1/12, ⅙) and (0, 0, 1).
-fn kernel_line([a, b, c]: [f64; 3]) -> [f64; REACH] {
-    let (even, odd) = ((a + c) / -6.0, b / 6.0);
-    let (even_2, odd_2) = (a / 24.0 + c / 6.0, b / 12.0);
-    [0.25 * a, even - odd, even + odd, even_2 + odd_2, even_2 - odd_2, c]
+/// A value of 16 output channels.
+type Wide = [f64; TILE];
+
+impl WithSimd for Kernels<'_> {
+    /// `G g Gᵀ`, `[frequency][channel in]`.
+    type Output = Vec<Lanes>;
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "weights are f32")]
+    #[expect(clippy::needless_range_loop, reason = "counted loops over constants are vectorised")]
+    fn with_simd<S: Simd>(self, _: S) -> Vec<Lanes> {
+        let mut frequencies = vec![[0.0; TILE]; N_FREQUENCIES * self.n_channels];
+        let mut kernel = [[0.0; TILE]; 9];
+        let mut half = [[[0.0; TILE]; REACH]; 3];
+        let mut line = [[0.0; TILE]; REACH];
+        for channel in 0..self.n_channels {
+            for lane in 0..self.kernels.len() / self.n_channels {
+                let values = &self.kernels[lane * self.n_channels + channel];
+                for element in 0..9 {
+                    kernel[element][lane] = f64::from(values[element]);
+                }
+            }
+            for row in 0..3 {
+                let (a, b, c) = (&kernel[3 * row], &kernel[3 * row + 1], &kernel[3 * row + 2]);
+                kernel_line(a, b, c, &mut half[row]);
+            }
+            for column in 0..REACH {
+                kernel_line(&half[0][column], &half[1][column], &half[2][column], &mut line);
+                for row in 0..REACH {
+                    let at = (row * REACH + column) * self.n_channels + channel;
+                    let lanes = &mut frequencies[at];
+                    for lane in 0..TILE {
+                        lanes[lane] = line[row][lane] as f32;
+                    }
+                }
+            }
+        }
+        frequencies
+    }
+}
+
+/// One axis of `G g Gᵀ`: the rows of `G` are (¼, 0, 0), (−⅙, ∓⅙, −⅙), (1/24, ±1/12, ⅙) and
+/// (0, 0, 1).
+#[inline(always)]
+fn kernel_line(a: &Wide, b: &Wide, c: &Wide, line: &mut [Wide; REACH]) {
+    for lane in 0..TILE {
+        let (a, b, c) = (a[lane], b[lane], c[lane]);
+        let (even, odd) = ((a + c) / -6.0, b / 6.0);
+        let (even_2, odd_2) = (a / 24.0 + c / 6.0, b / 12.0);
+        line[0][lane] = 0.25 * a;
+        line[1][lane] = even - odd;
+        line[2][lane] = even + odd;
+        line[3][lane] = even_2 + odd_2;
+        line[4][lane] = even_2 - odd_2;
+        line[5][lane] = c;
+    }
 }
 
 /// The tiles of all outputs.
