@@ -1,4 +1,4 @@
-//! Nuisance dials: recall@1 as one number of a recipe rises.
+//! Nuisance dials: recall@1 as numbers of a recipe rise.
 
 use serde::Deserialize;
 use vpr_core::{
@@ -10,7 +10,7 @@ use vpr_core::{
 
 use super::{super::Context, recall, techniques};
 
-/// One number of a recipe, turned up.
+/// A number of a recipe, or several that are one nuisance, turned up.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Dial {
@@ -18,9 +18,9 @@ pub struct Dial {
     pub name: String,
     /// World at which it is turned, with the settings that stay.
     pub world: String,
-    /// The recipe's key.
-    pub key: String,
-    /// Its values, rising.
+    /// The recipe's keys, which all get the same value.
+    pub keys: Vec<String>,
+    /// Their values, rising.
     pub values: Vec<f64>,
 }
 
@@ -28,7 +28,9 @@ impl Dial {
     /// The world at one value.
     fn at(&self, value: f64) -> String {
         let joint = if self.world.contains('?') { '&' } else { '?' };
-        format!("{}{joint}{}={value:?}", self.world, self.key)
+        let settings: Vec<String> =
+            self.keys.iter().map(|key| format!("{key}={value:?}")).collect();
+        format!("{}{joint}{}", self.world, settings.join("&"))
     }
 }
 
@@ -107,11 +109,13 @@ mod tests {
         let mut dial = Dial {
             name: "darkness".into(),
             world: "world/street".into(),
-            key: "queries.condition.darkness".into(),
+            keys: vec!["queries.condition.darkness".into()],
             values: vec![0.0],
         };
         assert_eq!(dial.at(1.0), "world/street?queries.condition.darkness=1.0");
         dial.world += "?places=9";
         assert_eq!(dial.at(0.25), "world/street?places=9&queries.condition.darkness=0.25");
+        dial.keys = vec!["a".into(), "b".into()];
+        assert_eq!(dial.at(0.5), "world/street?places=9&a=0.5&b=0.5");
     }
 }
