@@ -1,6 +1,8 @@
 """Time of convolutions, ResNet-34 and a training step, ours against PyTorch's, alternately.
 
-Two threads each. PyTorch runs with the malloc settings that keep it from returning its buffers to
+Two threads each. Before each round of either side there is a pause, in which the other side's waiting
+threads go to sleep (OpenMP's spin for some milliseconds and would take one of two cores from ours);
+a round is the median of some calls in a row. PyTorch runs with the malloc settings that keep it from returning its buffers to
 the system at each call; without them it looks two to three times slower on convolutions.
 """
 
@@ -35,6 +37,8 @@ LAYERS = [
     (1, 64, 64, 56, 3, 1),
     (1, 512, 512, 7, 3, 1),
 ]
+# Seconds before each round of a side, and calls in it.
+PAUSE, CALLS = 0.05, 7
 # Ours at most this many times PyTorch's.
 LIMITS = {"resnet34 1": 1.4, "resnet34 8": 1.4, "train 16": 2.0}
 
@@ -95,15 +99,23 @@ def main() -> int:
     missed = False
     for name, peer in cases.items():
         times = {"peer": [], "ours": []}
-        for _ in range(args.rounds + 2):
-            start = time.perf_counter_ns()
+        for _ in range(args.rounds + 1):
+            time.sleep(PAUSE)
+            calls = []
             with torch.inference_mode(not name.startswith("train")):
-                peer()
-            times["peer"].append((time.perf_counter_ns() - start) / 1e6)
-            ours.stdin.write(name + "\n")
-            ours.stdin.flush()
-            times["ours"].append(int(ours.stdout.readline()) / 1e6)
-        times = {who: it[2:] for who, it in times.items()}
+                for _ in range(CALLS):
+                    start = time.perf_counter_ns()
+                    peer()
+                    calls.append((time.perf_counter_ns() - start) / 1e6)
+            times["peer"].append(statistics.median(calls))
+            time.sleep(PAUSE)
+            calls = []
+            for _ in range(CALLS):
+                ours.stdin.write(name + "\n")
+                ours.stdin.flush()
+                calls.append(int(ours.stdout.readline()) / 1e6)
+            times["ours"].append(statistics.median(calls))
+        times = {who: it[1:] for who, it in times.items()}
         theirs, mine = (statistics.median(times[who]) for who in ("peer", "ours"))
         print(
             f"{name:28} PyTorch {theirs:.2f} ({min(times['peer']):.2f})  "

@@ -22,6 +22,10 @@ use vpr_nets::{
 type Case = Box<dyn FnMut()>;
 
 fn main() -> Result<(), String> {
+    // This thread works along, as PyTorch's does: a third one that only waits makes the scheduler
+    // put both workers on one core now and then.
+    let pool = rayon::ThreadPoolBuilder::new().use_current_thread();
+    pool.build_global().map_err(|err| err.to_string())?;
     let mut cases: HashMap<String, Case> = HashMap::new();
     for line in std::io::stdin().lock().lines() {
         let line = line.map_err(|err| err.to_string())?;

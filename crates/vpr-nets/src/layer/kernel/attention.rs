@@ -7,7 +7,7 @@
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::multiply::{DEPTH_BLOCK, Lanes, TILE, Tile, accumulate, dispatch};
+use super::multiply::{DEPTH_BLOCK, Lanes, TILE, Tile, accumulate, dispatch, multiply};
 use crate::fused::exp_of_negative;
 
 /// Rows that one thread copies at a time.
@@ -110,17 +110,20 @@ impl WithSimd for Head<'_> {
         let Heads { tokens, size, .. } = self.heads;
         let Scratch { queries, keys, values, weights, sums } = self.scratch;
         for (queries, out) in queries.chunks_exact(size).zip(self.out.chunks_mut(TILE * size)) {
-            weights.fill([[0.0; TILE]; TILE]);
             for (keys, weights) in keys.chunks_exact(size).zip(weights.iter_mut()) {
-                accumulate(simd, keys, queries, weights);
+                multiply(simd, keys, queries, weights);
             }
             let weights = &mut weights.as_flattened_mut()[..tokens];
             let totals = exponentials(weights);
-            sums.fill([[0.0; TILE]; TILE]);
             for start in (0..tokens).step_by(DEPTH_BLOCK) {
                 let weights = &weights[start..(start + DEPTH_BLOCK).min(tokens)];
                 for (values, sums) in values.chunks_exact(tokens).zip(sums.iter_mut()) {
-                    accumulate(simd, weights, &values[start..][..weights.len()], sums);
+                    let values = &values[start..][..weights.len()];
+                    if start == 0 {
+                        multiply(simd, weights, values, sums);
+                    } else {
+                        accumulate(simd, weights, values, sums);
+                    }
                 }
             }
             for (query, out) in out.chunks_exact_mut(size).enumerate() {

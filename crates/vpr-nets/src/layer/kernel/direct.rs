@@ -11,7 +11,7 @@ use super::{
     finish::Finish,
     geometry::Geometry,
     lower::Planes,
-    multiply::{DEPTH_BLOCK, Lanes, Packed, TILE, Tile, accumulate, dispatch},
+    multiply::{DEPTH_BLOCK, Lanes, Packed, TILE, Tile, accumulate, dispatch, multiply},
 };
 
 /// Panels that share one pass over the weights.
@@ -72,8 +72,7 @@ impl WithSimd for Part<'_> {
         let mut sums = vec![[[0.0; TILE]; TILE]; PANELS.min(n_panels) * n_groups];
         for first_panel in (0..n_panels).step_by(PANELS) {
             let n = PANELS.min(n_panels - first_panel);
-            sums.fill([[0.0; TILE]; TILE]);
-            multiply(
+            products(
                 simd,
                 &self,
                 first_panel,
@@ -97,7 +96,7 @@ impl WithSimd for Part<'_> {
 
 /// Sums of some panels, `[group][panel]`.
 #[inline(always)]
-fn multiply<S: Simd>(
+fn products<S: Simd>(
     simd: S,
     part: &Part<'_>,
     first_panel: usize,
@@ -114,7 +113,12 @@ fn multiply<S: Simd>(
         for (group, sums) in sums.chunks_exact_mut(n_panels).enumerate() {
             let rows = part.weights.group(part.first / TILE + group, depths.clone());
             for (panel, sums) in panels.chunks_exact(DEPTH_BLOCK).zip(sums) {
-                accumulate(simd, rows, &panel[..rows.len()], sums);
+                let panel = &panel[..rows.len()];
+                if start == 0 {
+                    multiply(simd, rows, panel, sums);
+                } else {
+                    accumulate(simd, rows, panel, sums);
+                }
             }
         }
     }

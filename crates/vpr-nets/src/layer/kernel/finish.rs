@@ -39,8 +39,11 @@ impl Finish<'_> {
             *value = *value * scale + shift;
         }
         if let Some(residual) = self.residual {
-            for (value, residual) in values.iter_mut().zip(&residual[at..at + out.len()]) {
-                *value += residual;
+            let residual = &residual[at..at + out.len()];
+            if let Ok(residual) = <&Lanes>::try_from(residual) {
+                values.iter_mut().zip(residual).for_each(|(value, residual)| *value += residual);
+            } else {
+                values.iter_mut().zip(residual).for_each(|(value, residual)| *value += residual);
             }
         }
         match self.activation {
@@ -48,6 +51,11 @@ impl Finish<'_> {
             Activation::Relu => values.iter_mut().for_each(|it| *it = it.max(0.0)),
             Activation::Relu6 => values.iter_mut().for_each(|it| *it = it.clamp(0.0, 6.0)),
         }
-        out.copy_from_slice(&values[..out.len()]);
+        // Of known length, it is one store and no call.
+        if let Ok(out) = <&mut Lanes>::try_from(&mut *out) {
+            *out = values;
+        } else {
+            out.copy_from_slice(&values[..out.len()]);
+        }
     }
 }

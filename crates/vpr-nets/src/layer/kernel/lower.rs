@@ -49,17 +49,35 @@ impl<'a> Planes<'a> {
     pub(super) fn lower(&self, first: usize, depths: std::ops::Range<usize>, panel: &mut [Lanes]) {
         let runs = self.runs(first);
         let n_elements = self.starts.len();
-        for (depth, lanes) in depths.zip(panel) {
-            let start = depth / n_elements * self.per_channel + self.starts[depth % n_elements];
+        let (mut channel, mut element) = (depths.start / n_elements, depths.start % n_elements);
+        for lanes in panel.iter_mut().take(depths.len()) {
+            let start = channel * self.per_channel + self.starts[element];
             if let [(from, to, TILE)] = runs[..] {
                 debug_assert_eq!(to, 0, "one run fills the panel");
                 lanes.copy_from_slice(&self.values[start + from..][..TILE]);
             } else {
-                for &(from, to, n) in &runs {
-                    lanes[to..to + n].copy_from_slice(&self.values[start + from..][..n]);
-                }
+                self.gather(start, &runs, lanes);
+            }
+            element += 1;
+            if element == n_elements {
+                (channel, element) = (channel + 1, 0);
             }
         }
+    }
+
+    /// Copies runs that lie apart. Each takes 16 values along, where there are as many, which the
+    /// next run overwrites: copies of known length are no calls.
+    fn gather(&self, start: usize, runs: &[(usize, usize, usize)], lanes: &mut Lanes) {
+        let mut wide = [0.0; 2 * TILE];
+        for &(from, to, n) in runs {
+            let source = &self.values[start + from..];
+            if let Some(source) = source.first_chunk::<TILE>() {
+                wide[to..to + TILE].copy_from_slice(source);
+            } else {
+                wide[to..to + n].copy_from_slice(&source[..n]);
+            }
+        }
+        lanes.copy_from_slice(&wide[..TILE]);
     }
 
     /// What 16 weights from `first` on are multiplied with at some output pixels: a row per pixel.

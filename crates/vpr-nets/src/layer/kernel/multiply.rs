@@ -70,33 +70,44 @@ pub(super) fn dispatch<T: WithSimd>(task: T) -> T::Output {
     Arch::new().dispatch(task)
 }
 
+/// Writes the product of 16 rows and a panel of 16 columns to `sums`.
+#[inline(always)]
+pub(super) fn multiply<S: Simd>(simd: S, rows: &[Lanes], panel: &[Lanes], sums: &mut Tile) {
+    product::<S, false>(simd, rows, panel, sums);
+}
+
 /// Adds the product of 16 rows and a panel of 16 columns to `sums`.
 #[inline(always)]
 pub(super) fn accumulate<S: Simd>(simd: S, rows: &[Lanes], panel: &[Lanes], sums: &mut Tile) {
+    product::<S, true>(simd, rows, panel, sums);
+}
+
+#[inline(always)]
+fn product<S: Simd, const ADD: bool>(simd: S, rows: &[Lanes], panel: &[Lanes], sums: &mut Tile) {
     match (S::F32_LANES, S::REGISTER_COUNT) {
-        (16, _) => part::<S, 0, 16, 1>(simd, rows, panel, sums),
+        (16, _) => part::<S, ADD, 0, 16, 1>(simd, rows, panel, sums),
         (8, _) => {
-            part::<S, 0, 6, 2>(simd, rows, panel, sums);
-            part::<S, 6, 5, 2>(simd, rows, panel, sums);
-            part::<S, 11, 5, 2>(simd, rows, panel, sums);
+            part::<S, ADD, 0, 6, 2>(simd, rows, panel, sums);
+            part::<S, ADD, 6, 5, 2>(simd, rows, panel, sums);
+            part::<S, ADD, 11, 5, 2>(simd, rows, panel, sums);
         }
         (4, 32..) => {
-            part::<S, 0, 4, 4>(simd, rows, panel, sums);
-            part::<S, 4, 4, 4>(simd, rows, panel, sums);
-            part::<S, 8, 4, 4>(simd, rows, panel, sums);
-            part::<S, 12, 4, 4>(simd, rows, panel, sums);
+            part::<S, ADD, 0, 4, 4>(simd, rows, panel, sums);
+            part::<S, ADD, 4, 4, 4>(simd, rows, panel, sums);
+            part::<S, ADD, 8, 4, 4>(simd, rows, panel, sums);
+            part::<S, ADD, 12, 4, 4>(simd, rows, panel, sums);
         }
         (4, _) => {
-            part::<S, 0, 2, 4>(simd, rows, panel, sums);
-            part::<S, 2, 2, 4>(simd, rows, panel, sums);
-            part::<S, 4, 2, 4>(simd, rows, panel, sums);
-            part::<S, 6, 2, 4>(simd, rows, panel, sums);
-            part::<S, 8, 2, 4>(simd, rows, panel, sums);
-            part::<S, 10, 2, 4>(simd, rows, panel, sums);
-            part::<S, 12, 2, 4>(simd, rows, panel, sums);
-            part::<S, 14, 2, 4>(simd, rows, panel, sums);
+            part::<S, ADD, 0, 2, 4>(simd, rows, panel, sums);
+            part::<S, ADD, 2, 2, 4>(simd, rows, panel, sums);
+            part::<S, ADD, 4, 2, 4>(simd, rows, panel, sums);
+            part::<S, ADD, 6, 2, 4>(simd, rows, panel, sums);
+            part::<S, ADD, 8, 2, 4>(simd, rows, panel, sums);
+            part::<S, ADD, 10, 2, 4>(simd, rows, panel, sums);
+            part::<S, ADD, 12, 2, 4>(simd, rows, panel, sums);
+            part::<S, ADD, 14, 2, 4>(simd, rows, panel, sums);
         }
-        _ => plain(rows, panel, sums),
+        _ => plain::<ADD>(rows, panel, sums),
     }
 }
 
@@ -105,16 +116,18 @@ pub(super) fn accumulate<S: Simd>(simd: S, rows: &[Lanes], panel: &[Lanes], sums
 /// Counted loops over constants, no closures: what is not unrolled at once leaves the registers.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "see above")]
-fn part<S: Simd, const FIRST: usize, const ROWS: usize, const VECTORS: usize>(
+fn part<S: Simd, const ADD: bool, const FIRST: usize, const ROWS: usize, const VECTORS: usize>(
     simd: S,
     rows: &[Lanes],
     panel: &[Lanes],
     sums: &mut Tile,
 ) {
     let mut partial = [[simd.splat_f32s(0.0); VECTORS]; ROWS];
-    for row in 0..ROWS {
-        for vector in 0..VECTORS {
-            partial[row][vector] = vector_of::<S>(&sums[FIRST + row], vector);
+    if ADD {
+        for row in 0..ROWS {
+            for vector in 0..VECTORS {
+                partial[row][vector] = vector_of::<S>(&sums[FIRST + row], vector);
+            }
         }
     }
     for (weights, lanes) in rows.iter().zip(panel) {
@@ -144,7 +157,10 @@ pub(super) fn vector_of<S: Simd>(lanes: &Lanes, vector: usize) -> S::f32s {
 }
 
 /// The same without vector registers.
-fn plain(rows: &[Lanes], panel: &[Lanes], sums: &mut Tile) {
+fn plain<const ADD: bool>(rows: &[Lanes], panel: &[Lanes], sums: &mut Tile) {
+    if !ADD {
+        *sums = [[0.0; TILE]; TILE];
+    }
     for (row, lanes) in rows.iter().zip(panel) {
         for (sums, value) in sums.iter_mut().zip(row) {
             for (sum, lane) in sums.iter_mut().zip(lanes) {

@@ -10,7 +10,7 @@
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::multiply::{DEPTH_BLOCK, Lanes, Packed, TILE, Tile, accumulate, dispatch};
+use super::multiply::{DEPTH_BLOCK, Lanes, Packed, TILE, Tile, accumulate, dispatch, multiply};
 
 /// Panels of 16 columns that share one pass over the rows: their block stays in the second cache.
 const PANELS: usize = 4;
@@ -76,7 +76,12 @@ impl WithSimd for Strip<'_> {
             for (group, sums) in sums.chunks_exact_mut(self.n_panels).enumerate() {
                 let rows = self.rows.group(group, depths.clone());
                 for (panel, sums) in panels.chunks_exact(DEPTH_BLOCK).zip(sums) {
-                    accumulate(simd, rows, &panel[..rows.len()], sums);
+                    let panel = &panel[..rows.len()];
+                    if start == 0 {
+                        multiply(simd, rows, panel, sums);
+                    } else {
+                        accumulate(simd, rows, panel, sums);
+                    }
                 }
             }
         }

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::{
     finish::{Activation, Finish},
     geometry::Geometry,
-    multiply::{DEPTH_BLOCK, Lanes, TILE, Tile, accumulate, dispatch, vector_of},
+    multiply::{DEPTH_BLOCK, Lanes, TILE, Tile, accumulate, dispatch, multiply, vector_of},
 };
 
 /// Outputs of one tile, per axis.
@@ -25,8 +25,8 @@ const STEP: usize = 4;
 const REACH: usize = 6;
 /// Frequencies.
 const N_FREQUENCIES: usize = REACH * REACH;
-/// Transformed input kept at a time, in bytes: well inside the last cache.
-const INPUT_BYTES: usize = 6 << 20;
+/// Transformed input kept at a time, in bytes.
+const INPUT_BYTES: usize = 1 << 20;
 
 /// Kernels as frequencies: for every 16 output channels a matrix per frequency, a row per channel.
 #[derive(Clone, Debug)]
@@ -166,10 +166,36 @@ pub(super) fn convolve(
     output: [usize; 2],
     finish: Finish<'_>,
 ) -> Vec<f32> {
+    let [n_images, n_channels, height, width] = geometry.input;
+    let per_image = geometry.n_out * output[0] * output[1];
+    let mut values = vec![0.0; n_images * per_image];
+    // Every thread takes some images from end to end; what is left over is shared.
+    let share = n_images.div_ceil(rayon::current_num_threads());
+    let inputs = input.par_chunks(share * n_channels * height * width);
+    values.par_chunks_mut(share * per_image).zip(inputs).enumerate().for_each(
+        |(index, (values, input))| {
+            let residual =
+                finish.residual.map(|it| &it[index * share * per_image..][..values.len()]);
+            let n_images = values.len() / per_image;
+            let geometry = Geometry { input: [n_images, n_channels, height, width], ..*geometry };
+            convolve_into(values, input, weights, &geometry, output, Finish { residual, ..finish });
+        },
+    );
+    values
+}
+
+/// Convolves some images.
+fn convolve_into(
+    values: &mut [f32],
+    input: &[f32],
+    weights: &Frequencies,
+    geometry: &Geometry,
+    output: [usize; 2],
+    finish: Finish<'_>,
+) {
     let tiles = Tiles::new(geometry, output);
-    let [n_images, n_channels, ..] = geometry.input;
+    let n_channels = geometry.input[1];
     let n_pixels = output[0] * output[1];
-    let mut values = vec![0.0; n_images * geometry.n_out * n_pixels];
     let n_panels = tiles.len().div_ceil(TILE);
     let per_block = (INPUT_BYTES / (N_FREQUENCIES * n_channels * size_of::<Lanes>())).max(1);
     for first in (0..n_panels).step_by(per_block) {
@@ -190,7 +216,6 @@ pub(super) fn convolve(
             dispatch(part);
         });
     }
-    values
 }
 
 /// The input of some panels as frequencies, `[panel][channel block][frequency][channel]`.
@@ -355,14 +380,18 @@ impl WithSimd for Part<'_> {
         let n_panels = self.panels.len();
         let mut sums = vec![[[0.0; TILE]; TILE]; N_FREQUENCIES * n_panels];
         for group in self.groups.clone() {
-            sums.fill([[0.0; TILE]; TILE]);
             for frequency in 0..N_FREQUENCIES {
                 for (block, channels) in self.transformed.channels.iter().enumerate() {
                     let rows = self.weights.group(group, frequency, channels.clone());
                     for panel in 0..n_panels {
                         let lanes = &self.transformed.blocks[panel * n_blocks + block];
                         let lanes = &lanes[frequency * rows.len()..][..rows.len()];
-                        accumulate(simd, rows, lanes, &mut sums[panel * N_FREQUENCIES + frequency]);
+                        let sums = &mut sums[panel * N_FREQUENCIES + frequency];
+                        if block == 0 {
+                            multiply(simd, rows, lanes, sums);
+                        } else {
+                            accumulate(simd, rows, lanes, sums);
+                        }
                     }
                 }
             }
