@@ -42,10 +42,10 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Number of cities
-    #[arg(long, default_value_t = 16)]
+    #[arg(long, default_value_t = 40)]
     cities: usize,
     /// Number of steps
-    #[arg(long, default_value_t = 700)]
+    #[arg(long, default_value_t = 3000)]
     steps: usize,
     /// Places in a step, a multiple of 4
     #[arg(long, default_value_t = 24)]
