@@ -1,8 +1,10 @@
 //! Nuisance dials: recall@1 as numbers of a recipe rise.
 
+use std::collections::BTreeMap;
+
 use serde::Deserialize;
 use vpr_core::{
-    Result,
+    Error, Result,
     figure::{Curve, Figure, Panel},
     metrics::bootstrap::Interval,
     table::{Cell, Provenance, Table},
@@ -22,14 +24,30 @@ pub struct Dial {
     pub keys: Vec<String>,
     /// Their values, rising.
     pub values: Vec<f64>,
+    /// Keys that go with them, with their own value for each of those.
+    #[serde(default)]
+    pub beside: BTreeMap<String, Vec<f64>>,
 }
 
 impl Dial {
-    /// The world at one value.
-    fn at(&self, value: f64) -> String {
+    /// The world at every value.
+    fn worlds(&self) -> Result<Vec<String>> {
+        if let Some((key, own)) = self.beside.iter().find(|(_, it)| it.len() != self.values.len()) {
+            return Err(Error::Parameter {
+                name: "beside",
+                value: format!("{} values of `{key}` in dial `{}`", own.len(), self.name),
+                reason: "must be as many as the dial has",
+            });
+        }
+        Ok((0..self.values.len()).map(|index| self.at(index)).collect())
+    }
+
+    fn at(&self, index: usize) -> String {
         let joint = if self.world.contains('?') { '&' } else { '?' };
+        let shared = self.keys.iter().map(|key| (key, self.values[index]));
+        let own = self.beside.iter().map(|(key, values)| (key, values[index]));
         let settings: Vec<String> =
-            self.keys.iter().map(|key| format!("{key}={value:?}")).collect();
+            shared.chain(own).map(|(key, value)| format!("{key}={value:?}")).collect();
         format!("{}{joint}{}", self.world, settings.join("&"))
     }
 }
@@ -46,11 +64,12 @@ pub(super) fn run(
         y_label: "recall@1".into(),
         ..Panel::default()
     };
+    let worlds = dial.worlds()?;
     for runner in techniques(context)? {
         let mut intervals = Vec::new();
-        for &value in &dial.values {
+        for (value, world) in dial.values.iter().zip(&worlds) {
             let row = format!("{} {value}", dial.name);
-            intervals.extend(recall(table, &row, &dial.at(value), &runner, context)?);
+            intervals.extend(recall(table, &row, world, &runner, context)?);
         }
         let points = dial.values.iter().zip(&intervals).map(|(&x, it)| (x, it.estimate)).collect();
         panel.curves.push(Curve { name: runner.0.to_owned(), points });
@@ -110,12 +129,25 @@ mod tests {
             name: "darkness".into(),
             world: "world/street".into(),
             keys: vec!["queries.condition.darkness".into()],
-            values: vec![0.0],
+            values: vec![0.25, 1.0],
+            beside: BTreeMap::new(),
         };
-        assert_eq!(dial.at(1.0), "world/street?queries.condition.darkness=1.0");
+        assert_eq!(
+            dial.worlds().unwrap(),
+            [0.25, 1.0].map(|it| format!("world/street?queries.condition.darkness={it:?}"))
+        );
         dial.world += "?places=9";
-        assert_eq!(dial.at(0.25), "world/street?places=9&queries.condition.darkness=0.25");
         dial.keys = vec!["a".into(), "b".into()];
-        assert_eq!(dial.at(0.5), "world/street?places=9&a=0.5&b=0.5");
+        dial.beside = [("c".to_owned(), vec![9.0, 8.0])].into();
+        assert_eq!(
+            dial.worlds().unwrap(),
+            [
+                "world/street?places=9&a=0.25&b=0.25&c=9.0",
+                "world/street?places=9&a=1.0&b=1.0&c=8.0"
+            ]
+        );
+        dial.beside = [("c".to_owned(), vec![9.0])].into();
+        let error = dial.worlds().unwrap_err().to_string();
+        assert!(error.contains("darkness") && error.contains("`c`"), "{error}");
     }
 }

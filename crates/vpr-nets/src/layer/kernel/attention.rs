@@ -7,7 +7,7 @@
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::multiply::{DEPTH_BLOCK, Lanes, TILE, Tile, accumulate, dispatch, multiply};
+use super::multiply::{DEPTH_BLOCK, Lanes, TILE, Tile, dispatch, multiply};
 use crate::fused::exp_of_negative;
 
 /// Rows that one thread copies at a time.
@@ -111,7 +111,7 @@ impl WithSimd for Head<'_> {
         let Scratch { queries, keys, values, weights, sums } = self.scratch;
         for (queries, out) in queries.chunks_exact(size).zip(self.out.chunks_mut(TILE * size)) {
             for (keys, weights) in keys.chunks_exact(size).zip(weights.iter_mut()) {
-                multiply(simd, keys, queries, weights);
+                multiply(simd, keys, queries, weights, true);
             }
             let weights = &mut weights.as_flattened_mut()[..tokens];
             let totals = exponentials(weights);
@@ -119,11 +119,7 @@ impl WithSimd for Head<'_> {
                 let weights = &weights[start..(start + DEPTH_BLOCK).min(tokens)];
                 for (values, sums) in values.chunks_exact(tokens).zip(sums.iter_mut()) {
                     let values = &values[start..][..weights.len()];
-                    if start == 0 {
-                        multiply(simd, weights, values, sums);
-                    } else {
-                        accumulate(simd, weights, values, sums);
-                    }
+                    multiply(simd, weights, values, sums, start == 0);
                 }
             }
             for (query, out) in out.chunks_exact_mut(size).enumerate() {

@@ -11,7 +11,7 @@ use super::{
     finish::Finish,
     geometry::Geometry,
     lower::Planes,
-    multiply::{DEPTH_BLOCK, Lanes, Packed, TILE, Tile, accumulate, dispatch, multiply},
+    multiply::{DEPTH_BLOCK, Lanes, Packed, TILE, Tile, dispatch, multiply},
 };
 
 /// Panels that share one pass over the weights.
@@ -114,11 +114,7 @@ fn products<S: Simd>(
             let rows = part.weights.group(part.first / TILE + group, depths.clone());
             for (panel, sums) in panels.chunks_exact(DEPTH_BLOCK).zip(sums) {
                 let panel = &panel[..rows.len()];
-                if start == 0 {
-                    multiply(simd, rows, panel, sums);
-                } else {
-                    accumulate(simd, rows, panel, sums);
-                }
+                multiply(simd, rows, panel, sums, start == 0);
             }
         }
     }

@@ -1,10 +1,11 @@
-//! Convolution on the CPU, over slices: ours, because burn-flex lowers on one thread, multiplies
-//! with a kernel of its own and stores, normalises and activates in separate passes
-//! (`docs/performance.md`).
+//! Convolution, products of rows and attention on the CPU, over slices, on one inner product
+//! ([`multiply`]). Ours, because burn-flex lowers on one thread, multiplies with other kernels and
+//! stores, normalises and activates in separate passes (`docs/performance.md`).
 
 mod attention;
 mod direct;
 mod finish;
+mod frequencies;
 mod geometry;
 mod lower;
 mod multiply;
@@ -17,11 +18,11 @@ use std::sync::OnceLock;
 pub(crate) use attention::{Heads, attend};
 pub use finish::Activation;
 pub(crate) use finish::Finish;
+use frequencies::Frequencies;
 pub(crate) use geometry::Geometry;
 use multiply::Packed;
 pub(crate) use product::product;
 pub(crate) use weights_gradient::weights_gradient;
-use winograd::Frequencies;
 
 /// Weights of one group of a convolution, packed when first needed.
 #[derive(Debug, Default)]

@@ -1,4 +1,5 @@
-//! The inner matrix product of all convolutions here: 16 output channels by 16 columns at a time.
+//! The inner matrix product of everything here: 16 rows (output channels, tokens) by 16 columns at
+//! a time.
 //!
 //! Left factors are packed once ([`Packed`]), right factors come as panels of 16 columns, so both
 //! are read in order and no `unsafe` is needed. The widest registers of the processor are chosen
@@ -70,16 +71,20 @@ pub(super) fn dispatch<T: WithSimd>(task: T) -> T::Output {
     Arch::new().dispatch(task)
 }
 
-/// Writes the product of 16 rows and a panel of 16 columns to `sums`.
+/// Adds the product of 16 rows and a panel of 16 columns to `sums`; the first writes them.
 #[inline(always)]
-pub(super) fn multiply<S: Simd>(simd: S, rows: &[Lanes], panel: &[Lanes], sums: &mut Tile) {
-    product::<S, false>(simd, rows, panel, sums);
-}
-
-/// Adds the product of 16 rows and a panel of 16 columns to `sums`.
-#[inline(always)]
-pub(super) fn accumulate<S: Simd>(simd: S, rows: &[Lanes], panel: &[Lanes], sums: &mut Tile) {
-    product::<S, true>(simd, rows, panel, sums);
+pub(super) fn multiply<S: Simd>(
+    simd: S,
+    rows: &[Lanes],
+    panel: &[Lanes],
+    sums: &mut Tile,
+    is_first: bool,
+) {
+    if is_first {
+        product::<S, false>(simd, rows, panel, sums);
+    } else {
+        product::<S, true>(simd, rows, panel, sums);
+    }
 }
 
 #[inline(always)]

@@ -10,7 +10,7 @@
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::multiply::{DEPTH_BLOCK, Lanes, Packed, TILE, Tile, accumulate, dispatch, multiply};
+use super::multiply::{DEPTH_BLOCK, Lanes, Packed, TILE, Tile, dispatch, multiply};
 
 /// Panels of 16 columns that share one pass over the rows: their block stays in the second cache.
 const PANELS: usize = 4;
@@ -77,11 +77,7 @@ impl WithSimd for Strip<'_> {
                 let rows = self.rows.group(group, depths.clone());
                 for (panel, sums) in panels.chunks_exact(DEPTH_BLOCK).zip(sums) {
                     let panel = &panel[..rows.len()];
-                    if start == 0 {
-                        multiply(simd, rows, panel, sums);
-                    } else {
-                        accumulate(simd, rows, panel, sums);
-                    }
+                    multiply(simd, rows, panel, sums, start == 0);
                 }
             }
         }

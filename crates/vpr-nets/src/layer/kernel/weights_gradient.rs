@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::{
     geometry::Geometry,
     lower::Planes,
-    multiply::{DEPTH_BLOCK, Packed, TILE, Tile, accumulate, dispatch},
+    multiply::{DEPTH_BLOCK, Packed, TILE, Tile, dispatch, multiply},
 };
 
 /// Panels of 16 weights that share one pass over the output's gradient.
@@ -78,7 +78,7 @@ impl WithSimd for Block<'_> {
                 for (group, sums) in sums.chunks_exact_mut(self.n).enumerate() {
                     let rows = gradient.group(group, pixels.clone());
                     for (panel, sums) in panels.chunks_exact(DEPTH_BLOCK).zip(sums) {
-                        accumulate(simd, rows, &panel[..rows.len()], sums);
+                        multiply(simd, rows, &panel[..rows.len()], sums, false);
                     }
                 }
             }
