@@ -24,7 +24,8 @@ use super::{
 use crate::fused::{Moments, Sets, Sharing};
 
 /// Normalisation of `[images, channels, height, width]` by the statistics of the batch where `norm`
-/// is in training, by its running ones elsewhere; as `torch.nn.BatchNorm2d`.
+/// is in training, by its running ones elsewhere; burn's layer, whose running variance is over n
+/// (PyTorch's is over n − 1).
 pub(super) fn batch_norm(norm: &BatchNorm, map: Tensor<4>) -> Tensor<4> {
     let channels = norm.gamma.val().dims()[0];
     let is_training = map.device().is_autodiff() && norm.training.is_enabled();
@@ -54,7 +55,7 @@ pub(super) fn group_norm(norm: &GroupNorm, map: &Tensor<4>) -> Option<Tensor<4>>
 }
 
 fn is_recorded(map: &Tensor<4>) -> bool {
-    is_recorded_here(&map.clone().into_dispatch().kind)
+    map.dims().iter().all(|&it| it > 0) && is_recorded_here(&map.clone().into_dispatch().kind)
 }
 
 fn normalize(
