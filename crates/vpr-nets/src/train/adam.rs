@@ -1,6 +1,6 @@
 //! Adam and `AdamW` in one pass over each parameter, on all threads.
 //!
-//! burn takes a dozen passes on one thread. The arithmetic is burn's, and so is every bit.
+//! burn takes a dozen passes. The arithmetic is burn's, and so is every bit.
 #![expect(
     clippy::inline_always,
     reason = "only what is inlined into the dispatch is compiled for its registers"
