@@ -1,22 +1,20 @@
 //! VPR-Bench, chapter 3 of the thesis: techniques × datasets × metrics, invariance and cost.
 //!
+//! What is computed is an experiment, as the files in `experiments/` are; what a technique finds on
+//! a dataset comes from [`vpr_study`].
+//!
 //! ```
-//! use bench::evaluate::{Evaluation, Positives};
-//! use ndarray::array;
-//! use vpr_core::{GroundTruth, Similarities};
+//! use bench::study::{Context, Study, run};
+//! use vpr_report::{experiment::Experiment, table::Format};
+//! use vpr_study::Sources;
 //!
-//! // Two queries, three references; higher is more similar.
-//! let similarities = Similarities::new(array![[0.9, 0.2, 0.1], [0.3, 0.1, 0.4]])?;
-//! let truth = GroundTruth::from_lists(vec![vec![0], vec![1]], 3)?;
-//!
-//! let evaluation = Evaluation::new(&similarities, &truth)?;
-//! assert_eq!(evaluation.recall_at(1)?, 0.5);
-//! assert_eq!(evaluation.auc_pr(Positives::Published)?, 1.0); // the right match is the surer one
-//! assert_eq!(evaluation.auc_pr(Positives::corrected(&truth))?, 0.5);
-//! # Ok::<(), vpr_core::Error>(())
+//! let study = Study::AucPr { datasets: vec!["world/street?places=3&camera.width=80".to_owned()] };
+//! let experiment = Experiment::new("table-0", "AUC-PR on three places", study);
+//! let cache = tempfile::tempdir()?;
+//! let sources = Sources::new([], cache.path(), &());
+//! let report = run(&experiment, Context { sources: &sources, timings: false, seed: 0 })?;
+//! assert!(report.table.render(Format::Csv).contains("HOG"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod data;
-pub mod evaluate;
 pub mod study;
-pub mod technique;

@@ -5,7 +5,7 @@ mod command;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use vpr_core::cli;
+use vpr_report::cli;
 
 /// VPR-Bench, chapter 3: techniques, datasets, metrics, invariance and cost of place recognition.
 #[derive(Parser)]

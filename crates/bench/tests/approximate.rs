@@ -14,7 +14,7 @@ use std::{
 };
 
 use ndarray::Array2;
-use vpr_core::npy;
+use vpr_files::npy;
 
 fn bench_map(folder: &Path, args: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));

@@ -10,7 +10,7 @@ use std::{
 
 use ndarray::array;
 use serde_json::Value;
-use vpr_core::npy;
+use vpr_files::npy;
 
 fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().expect("a workspace")

@@ -13,7 +13,7 @@ use std::{
 };
 
 use ndarray::Array2;
-use vpr_core::npy;
+use vpr_files::npy;
 
 /// A program that has ended.
 struct Ended(Output);

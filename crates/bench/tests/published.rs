@@ -17,16 +17,14 @@
 
 use std::path::{Path, PathBuf};
 
-use bench::{
-    data::{Data, Stored},
-    evaluate::{Evaluation, Positives},
-    technique::{Describe as _, HandCrafted, Technique},
-};
+use std::sync::Arc;
+
 use vpr_core::{
-    Definition, Similarities,
-    dataset::layout::vpr_bench::{read_areas, read_curves},
-    metrics,
+    Definition, Evaluation, Judged, Similarities,
+    metrics::{self, Positives, recall_at},
 };
+use vpr_data::layout::vpr_bench::{read_areas, read_curves};
+use vpr_study::{Describe as _, HandCrafted, Sources, Stored, Technique};
 use vpr_vision::{cohog::CoHogParams, hog::HogParams};
 
 const TOLERANCE: f64 = 1e-6;
@@ -35,12 +33,13 @@ fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-fn data() -> Option<Data> {
+fn data() -> Option<Sources<'static>> {
     let Some(folder) = std::env::var_os("VPR_DATA") else {
         println!("skipped: VPR_DATA is not set");
         return None;
     };
-    Some(Data::new(Path::new(&folder), &workspace().join("data"), &workspace().join("data/worlds")))
+    let workspace = workspace().join("data");
+    Some(Sources::new([Path::new(&folder), &workspace], &workspace.join("worlds"), &()))
 }
 
 /// One line of the oracle: dataset id, technique, values by column name.
@@ -64,28 +63,27 @@ fn all_columns_of_the_oracle_are_reproduced() {
     assert_eq!(lines.len(), 20);
     for (dataset, technique, header, line) in lines {
         let stored = data.stored(dataset, technique).unwrap().expect("published matches at hand");
+        let judged = Judged::new(&stored.scores.best().reference, &stored.truth).unwrap();
         let evaluation =
-            Evaluation::of_matches(stored.best, &stored.similarities, &stored.truth).unwrap();
-        let (confidence, correct) = (evaluation.confidence(), evaluation.correct());
+            Evaluation::of_confidence(&stored.scores.best().confidence, &judged).unwrap();
+        let (confidence, correct) = (evaluation.confidence(), judged.correct());
+        let recall = |n| recall_at(n, stored.scores.ranking()?, &stored.truth);
         let published = Positives::Published;
         let computed = [
-            ("auc_pr_trapz", evaluation.auc_pr(published)),
-            ("average_precision", evaluation.average_precision(published)),
-            (
-                "auc_pr_slam_recall(GTP_denominator)",
-                evaluation.auc_pr(Positives::corrected(&stored.truth)),
-            ),
+            ("auc_pr_trapz", evaluation.auc_pr(Definition::Published)),
+            ("average_precision", evaluation.average_precision(Definition::Published)),
+            ("auc_pr_slam_recall(GTP_denominator)", evaluation.auc_pr(Definition::Corrected)),
             ("auc_roc", metrics::auc_roc(confidence, correct)),
             ("ep", metrics::extended_precision(confidence, correct, published)),
             (
                 "precision_at_first_full_recall",
                 metrics::precision_at_full_recall(Definition::Published, confidence, correct),
             ),
-            ("r@1", evaluation.recall_at(1)),
-            ("r@5", evaluation.recall_at(5)),
-            ("r@10", evaluation.recall_at(10)),
-            ("r@19", evaluation.recall_at(19)),
-            ("r@20", evaluation.recall_at(20)),
+            ("r@1", recall(1)),
+            ("r@5", recall(5)),
+            ("r@10", recall(10)),
+            ("r@19", recall(19)),
+            ("r@20", recall(20)),
         ];
         for (column, value) in computed {
             let index = header.iter().position(|it| it == column).unwrap();
@@ -105,7 +103,8 @@ fn stored_best_matches_follow_from_the_stored_scores() {
     let Some(data) = data() else { return };
     for (dataset, technique, _, _) in oracle() {
         let stored = data.stored(dataset, technique).unwrap().expect("published matches at hand");
-        assert_eq!(stored.similarities.best(), stored.best, "{dataset} {}", technique.name());
+        let (similarities, best) = (stored.scores.similarities(), stored.scores.best());
+        assert_eq!(similarities.best(), *best, "{dataset} {}", technique.name());
     }
 }
 
@@ -114,7 +113,7 @@ fn areas_between_the_published_curves_are_the_stored_ones() {
     let Some(data) = data() else { return };
     let file = |name: &str| {
         let path = format!("vpr-bench/invariance_dict/{name}.pkl");
-        data.find(&path).expect("invariance dictionaries at hand")
+        data.locate(path.as_ref()).unwrap().expect("invariance dictionaries at hand")
     };
     let variations = [
         ("viewpoint_variations", "viewpoint_variations"),
@@ -136,9 +135,13 @@ fn areas_between_the_published_curves_are_the_stored_ones() {
 }
 
 /// Our scores of a technique on Corridor's images, and the stored ones.
-fn corridor(data: &Data, technique: Technique, ours: &HandCrafted) -> (Similarities, Stored) {
+fn corridor(
+    data: &Sources<'_>,
+    technique: Technique,
+    ours: &HandCrafted,
+) -> (Similarities, Arc<Stored>) {
     let stored = data.stored("corridor", technique).unwrap().expect("published matches at hand");
-    let images = data.images("corridor", &()).unwrap().expect("images at hand");
+    let images = data.images("corridor").unwrap().expect("images at hand");
     let queries = ours.encode(&images.queries, &|| ()).unwrap();
     let references = ours.encode(&images.references, &|| ()).unwrap();
     (queries.match_with(&references).unwrap().similarities, stored)
@@ -146,20 +149,24 @@ fn corridor(data: &Data, technique: Technique, ours: &HandCrafted) -> (Similarit
 
 /// Mean and largest absolute difference of two score matrices.
 fn difference(ours: &Similarities, stored: &Stored) -> (f64, f64) {
-    let apart: Vec<f64> =
-        ours.view().iter().zip(stored.similarities.view()).map(|(a, b)| (a - b).abs()).collect();
+    let apart: Vec<f64> = ours
+        .view()
+        .iter()
+        .zip(stored.scores.similarities().view())
+        .map(|(a, b)| (a - b).abs())
+        .collect();
     let largest = apart.iter().copied().fold(0.0, f64::max);
     (apart.iter().sum::<f64>() / apart.len() as f64, largest)
 }
 
 fn recall_at_1(similarities: &Similarities, stored: &Stored) -> f64 {
-    Evaluation::new(similarities, &stored.truth).unwrap().recall_at(1).unwrap()
+    recall_at(1, &similarities.ranked(1).unwrap(), &stored.truth).unwrap()
 }
 
 /// Share of queries whose best reference is the stored one.
 fn same_best(similarities: &Similarities, stored: &Stored) -> f64 {
     let best = similarities.best().reference;
-    let same = best.iter().zip(&stored.best.reference).filter(|(a, b)| a == b).count();
+    let same = best.iter().zip(&stored.scores.best().reference).filter(|(a, b)| a == b).count();
     same as f64 / best.len() as f64
 }
 
@@ -187,7 +194,7 @@ fn cohog_recalls_as_published() {
     let (ours, stored) = corridor(&data, Technique::CoHog, &cohog);
     let (mean, largest) = difference(&ours, &stored);
     let (recall, published) =
-        (recall_at_1(&ours, &stored), recall_at_1(&stored.similarities, &stored));
+        (recall_at_1(&ours, &stored), recall_at_1(stored.scores.similarities(), &stored));
     println!(
         "CoHOG on Corridor: mean difference {mean:.6}, largest {largest:.5}, same best {:.3}, R@1 {recall:.4}",
         same_best(&ours, &stored)

@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 use anyhow::Context;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use vpr_core::cli;
+use vpr_report::cli;
 use vpr_worlds::{RENDERER, Recipe, Traverse, photograph_city, recipe_with};
 use xxhash_rust::xxh3::xxh3_64;
 

@@ -7,7 +7,7 @@ mod validate;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use vpr_core::cli;
+use vpr_report::cli;
 
 /// The small network that every clone has.
 #[derive(Parser)]

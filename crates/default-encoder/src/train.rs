@@ -13,11 +13,11 @@ use default_encoder::{
     pixels::Album,
 };
 use ndarray::{Axis, concatenate};
-use vpr_core::cli::{self, Outcome};
 use vpr_nets::{
     model::default::{DefaultEncoder, DefaultEncoderConfig, INPUT},
     train::{Checkpoint, Descent, Optimizer, Report, Schedule, learned_whitening, seeded},
 };
+use vpr_report::cli::{self, Outcome};
 
 use crate::validate::{self, BATCH};
 

@@ -8,20 +8,20 @@ use ndarray::Array2;
 use rayon::prelude::*;
 use vpr_core::{
     Descriptors, GroundTruth,
-    cli::{self, Outcome},
-    dataset::{DataRoots, Dataset},
     metrics::{
         bootstrap::{Z_95, wilson_interval},
         recall_at,
     },
     retrieve,
 };
+use vpr_data::{DataRoots, Dataset, Datasets};
 use vpr_nets::model::default::{DefaultEncoder, DefaultEncoderConfig, INPUT};
+use vpr_report::cli::{self, Outcome};
 use vpr_vision::{
     hog::{Hog, HogParams},
     image,
 };
-use vpr_worlds::{World, open_named, recipe_with};
+use vpr_worlds::{World, Worlds, recipe_with};
 
 /// Images that go through the network at a time.
 pub(crate) const BATCH: usize = 32;
@@ -80,16 +80,17 @@ const REAL: [&str; 5] =
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let network = DefaultEncoderConfig::new().init(&vpr_nets::device()).load(&args.weights)?;
     let roots = DataRoots::new([args.data.clone()]);
+    let datasets = Datasets::new(roots, &args.cache, Worlds);
     let bar = cli::Bar::default();
     cli::print("dataset\tprovenance\tqueries\tdefault\tlow\thigh\thog\tlow\thigh\tnote\n")?;
     for (name, settings, note) in WORLDS {
         let id = format!("world/{name}?{ALIKE}&{settings}");
-        let world = open_named(id.trim_end_matches('&'), &roots, &args.cache, &bar)?;
+        let world = datasets.open(id.trim_end_matches('&'), &bar)?;
         let world = world.with_context(|| format!("world/{name} cannot be rendered"))?;
         row(&format!("world/{name}\tgenerated"), note, &network, &world)?;
     }
     for id in REAL {
-        match open_named(id, &roots, &args.cache, &bar)? {
+        match datasets.open(id, &bar)? {
             Some(dataset) => row(&format!("{id}\tmeasured"), &dataset.name, &network, &dataset)?,
             None => cli::note(&format!("{id} is not at hand")),
         }

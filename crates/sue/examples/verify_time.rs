@@ -17,7 +17,9 @@ use vpr_vision::{
 fn main() -> vpr_core::Result<()> {
     let paths: Vec<String> = std::env::args().skip(1).collect();
     for pair in paths.chunks_exact(2) {
-        let read = |path: &String| Ok(image::gray(&image::decode(Path::new(path))?));
+        let read = |path: &String| -> vpr_core::Result<_> {
+            Ok(image::gray(&image::decode(Path::new(path))?))
+        };
         let (query, reference) = (read(&pair[0])?, read(&pair[1])?);
         let start = Instant::now();
         let query = sift::detect(&query, &SiftParams::default())?;

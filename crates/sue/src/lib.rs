@@ -30,7 +30,6 @@ pub mod corpus;
 mod decision;
 mod error;
 mod estimator;
-pub mod evaluate;
 mod evidence;
 pub mod fusion;
 pub mod net;

@@ -5,7 +5,7 @@ mod command;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use vpr_core::cli;
+use vpr_report::cli;
 
 /// SUE, chapter 5: uncertainty of the best match in visual place recognition.
 #[derive(Parser)]

@@ -14,8 +14,8 @@ use tempfile::TempDir;
 use vpr_core::{
     Descriptors, Map, PlanarPosition, Poses,
     map::{self, About, Coordinates, Names, UtmZone},
-    npy,
 };
+use vpr_files::npy;
 
 /// A map of twelve places with look-alikes, and queries in front of some of them.
 struct World {

@@ -9,7 +9,7 @@ use std::{
 };
 
 use sue::study::Study;
-use vpr_core::experiment;
+use vpr_report::experiment;
 
 const WORLD: &str = "world/corridor?places=12&camera.width=80&camera.height=60&camera.focal=55.0";
 

@@ -20,9 +20,9 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use vpr_core::{
     Descriptors,
-    figure::{Curve, Figure, Panel},
     knn::{SearchParams, search},
 };
+use vpr_report::figure::{Curve, Figure, Panel};
 
 /// Values per descriptor where something else varies.
 const DIM: usize = 128;

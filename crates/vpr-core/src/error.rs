@@ -100,6 +100,17 @@ pub enum Error {
     },
 }
 
+impl From<vpr_files::Error> for Error {
+    fn from(error: vpr_files::Error) -> Self {
+        match error {
+            vpr_files::Error::Io { path, source } => Self::Io { path, source },
+            vpr_files::Error::Format { path, place, reason } => {
+                Self::Format { path, place, reason }
+            }
+        }
+    }
+}
+
 impl Error {
     /// An [`Error::Io`] for `path`; for use in `map_err`.
     pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(io::Error) -> Self {

@@ -117,7 +117,7 @@ impl Retrieval {
 
 /// Finds the `k` references nearest to every query in Euclidean distance, exactly.
 ///
-/// The simple door to [`knn::search`](crate::knn::search), which has the same result for any
+/// The simple way to [`knn::search`](crate::knn::search), which has the same result for any
 /// number of threads. Gives fewer than `k` columns if there are fewer references.
 ///
 /// # Errors

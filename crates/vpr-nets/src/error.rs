@@ -30,6 +30,12 @@ pub enum Error {
     },
 }
 
+impl From<vpr_files::Error> for Error {
+    fn from(err: vpr_files::Error) -> Self {
+        Self::Core(err.into())
+    }
+}
+
 impl From<Error> for vpr_core::Error {
     fn from(err: Error) -> Self {
         match err {

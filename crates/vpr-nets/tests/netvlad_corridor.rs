@@ -4,11 +4,8 @@
 
 use std::path::{Path, PathBuf};
 
-use vpr_core::{
-    Similarities,
-    dataset::layout::vpr_bench::{GroundTruthFile, image_folder},
-    metrics::recall_at,
-};
+use vpr_core::{Similarities, metrics::recall_at};
+use vpr_data::layout::vpr_bench::{GroundTruthFile, image_folder};
 use vpr_nets::encode::{Options, by_name, encode_files};
 
 #[test]

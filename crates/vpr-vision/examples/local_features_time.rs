@@ -6,7 +6,8 @@
 
 use std::{hint::black_box, path::Path, time::Instant};
 
-use vpr_core::{Descriptors, Result, npy};
+use vpr_core::{Descriptors, Result};
+use vpr_files::npy;
 use vpr_vision::{
     features::{LocalDescriptors, LocalFeatures},
     image::{decode, gray},

@@ -63,7 +63,7 @@ pub use family::{
 };
 pub use film::Film;
 pub use layout::Side;
-pub use named::{entry, is_world, named_recipe, open_named};
+pub use named::{Worlds, is_world, named_recipe};
 pub use preview::preview;
 pub use recipe::{Layout, Offset, Recipe, Tolerance, Traverse};
 pub use scenery::{Photograph, Scenery, photograph_city};
@@ -75,6 +75,6 @@ pub use world::{RENDERER, World};
 /// # Errors
 ///
 /// [`vpr_core::Error::Unknown`] with all names, and those of [`World::open`].
-pub fn open(name: &str, cache: &Path) -> vpr_core::Result<vpr_core::dataset::Dataset> {
+pub fn open(name: &str, cache: &Path) -> vpr_core::Result<vpr_data::Dataset> {
     Ok(World::open(&recipe(name)?, cache, &|| {})?.dataset)
 }

@@ -7,10 +7,8 @@ use std::{
 
 use anyhow::Context;
 use clap::{Args as ClapArgs, Parser, Subcommand};
-use vpr_core::{
-    cli::{self, Outcome},
-    dataset::DataRoots,
-};
+use vpr_data::DataRoots;
+use vpr_report::cli::{self, Outcome};
 use vpr_worlds::{Recipe, World, names, preview, recipe_with};
 
 /// Generated places with exact poses and quantified nuisances.

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use vpr_core::{Error, dataset::DataRoots};
+use vpr_core::Error;
+use vpr_data::DataRoots;
 
 use crate::{
     camera::Camera,

@@ -14,7 +14,9 @@ use ndarray::Array2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use vpr_core::{Error, Poses, Result, dataset::Dataset, npy};
+use vpr_core::{Error, Poses, Result};
+use vpr_data::Dataset;
+use vpr_files::npy;
 
 use crate::{
     family::{Plan, SevenScenes, Shot, plan, truth},
@@ -158,7 +160,7 @@ impl World {
     ///
     /// [`Error::Io`] if the recipe did not ask for it, [`Error::Format`] if it is malformed.
     pub fn overlap(&self) -> Result<Array2<f32>> {
-        npy::read_f32(&self.folder.join("overlap.npy"))
+        Ok(npy::read_f32(&self.folder.join("overlap.npy"))?)
     }
 }
 

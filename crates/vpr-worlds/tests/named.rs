@@ -8,8 +8,9 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering},
 };
 
-use vpr_core::{Observer, Poses, dataset::DataRoots, table::Provenance};
-use vpr_worlds::{is_world, named_recipe, open_named};
+use vpr_core::{Observer, Poses, Provenance};
+use vpr_data::{DataRoots, Dataset, Datasets};
+use vpr_worlds::{Worlds, is_world, named_recipe};
 
 /// Counts what it is told.
 #[derive(Default)]
@@ -47,6 +48,16 @@ fn real_roots(test: &str) -> Option<DataRoots> {
         return None;
     };
     Some(DataRoots::new([PathBuf::from(data)]))
+}
+
+/// Opens a dataset by name.
+fn open_named(
+    id: &str,
+    roots: &DataRoots,
+    cache: &Path,
+    observer: &dyn Observer,
+) -> vpr_core::Result<Option<Dataset>> {
+    Datasets::new(roots.clone(), cache, Worlds).open(id, observer)
 }
 
 #[test]

@@ -2,16 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::ensure;
-use vpr_core::{
-    cli::{self, DataArgs, Outcome},
-    dataset::layout::{utm_names::images_below, vpr_bench::image_folder},
-    map::{
-        RowType,
-        door::{self, Format, Parts},
-    },
+use vpr_core::map::RowType;
+use vpr_data::{
+    exchange::{self, Format, Parts},
+    layout::numbered::images_in_order,
 };
 use vpr_nets::encode::{Images, encode_to_map};
+use vpr_report::cli::{self, DataArgs, Outcome};
 
 use super::encoder::EncoderArgs;
 
@@ -77,20 +74,18 @@ pub(crate) fn run(args: &EncodeArgs) -> anyhow::Result<Outcome> {
 /// The images of the folder in the order of their numbers, or else of their paths.
 fn images(args: &EncodeArgs) -> anyhow::Result<Images> {
     let folder = &args.images;
-    let paths = match image_folder(folder) {
-        Ok(paths) => paths,
-        Err(_) => images_below(folder)?,
-    };
-    ensure!(!paths.is_empty(), "{}: has no image", folder.display());
+    let paths = images_in_order(folder)?;
     let name =
         |path: &PathBuf| path.strip_prefix(folder).unwrap_or(path).to_string_lossy().into_owned();
     let names: Vec<String> = paths.iter().map(name).collect();
     let poses = match &args.poses {
         Some(poses) => {
             let format = args.poses_format.map_or_else(|| Format::guess(poses), Ok)?;
-            Some((door::read(format, poses)?, poses.as_path()))
+            Some((exchange::read(format, poses)?, poses.as_path()))
         }
-        None if is_utm(&paths) => Some((door::read(Format::UtmNames, folder)?, folder.as_path())),
+        None if is_utm(&paths) => {
+            Some((exchange::read(Format::UtmNames, folder)?, folder.as_path()))
+        }
         None => None,
     };
     let mut parts = Parts { names: Some(names.iter().collect()), ..Parts::default() };

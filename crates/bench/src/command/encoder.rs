@@ -49,7 +49,7 @@ impl EncoderArgs {
         if let (Some(official), Some(actual)) = (official, encoder.weights_digest())
             && official != actual
         {
-            vpr_core::cli::note(&format!(
+            vpr_report::cli::note(&format!(
                 "warning: the weights are not the published ones of `{method}`: {actual}"
             ));
         }

@@ -3,21 +3,23 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use bench::{
-    data::Data,
-    technique::{Describe as _, HandCrafted},
-};
 use vpr_core::{
     Descriptors, GroundTruth, Observer as _, Ranking,
-    cli::{self, Bar, DataArgs, Outcome},
-    dataset::layout::vpr_bench::GroundTruthFile,
     metrics::{Positives, auc_pr, recall_at},
-    npy, retrieve,
+    retrieve,
 };
+use vpr_data::layout::vpr_bench::GroundTruthFile;
+use vpr_files::npy;
 use vpr_nets::encode::{Encoder, Options, encode_files};
-use vpr_vision::{cohog::CoHogParams, hog::HogParams};
+use vpr_report::cli::{self, Bar, DataArgs, Outcome};
+use vpr_study::{Runner, Sources, technique::hand_crafted};
 
-use super::{encoder::EncoderArgs, named::Named, predictions};
+use super::{
+    encoder::EncoderArgs,
+    named::Named,
+    predictions::{self, Saving},
+    retrieved::Retrieved,
+};
 
 /// The flags of VPR-methods-evaluation, in kebab case; the names with underscores work too.
 #[derive(clap::Args)]
@@ -32,10 +34,10 @@ pub(crate) struct EvaluateArgs {
     dataset: Option<String>,
     /// Folder of the reference images, with `@utm_east@utm_north@…` names
     #[arg(long, alias = "database_folder", value_name = "DIR", requires = "queries_folder")]
-    pub(super) database_folder: Option<PathBuf>,
+    database_folder: Option<PathBuf>,
     /// Folder of the query images
     #[arg(long, alias = "queries_folder", value_name = "DIR", requires = "database_folder")]
-    pub(super) queries_folder: Option<PathBuf>,
+    queries_folder: Option<PathBuf>,
     /// Technique that describes the images: hog, hog-thesis, cohog, or a network of `bench methods`
     #[arg(long, default_value = "hog", value_name = "NAME")]
     method: String,
@@ -80,60 +82,22 @@ pub(crate) struct EvaluateArgs {
     auc_pr: bool,
     /// Only retrieve; positions are unknown
     #[arg(long, alias = "no_labels")]
-    pub(super) no_labels: bool,
+    no_labels: bool,
     /// How many predictions to save for each query
     #[arg(long, alias = "num_preds_to_save", default_value_t = 0, value_name = "N")]
-    pub(super) num_preds_to_save: usize,
+    num_preds_to_save: usize,
     /// Save only predictions of queries whose best reference is wrong
     #[arg(long, alias = "save_only_wrong_preds", conflicts_with = "no_labels")]
-    pub(super) save_only_wrong_preds: bool,
+    save_only_wrong_preds: bool,
     /// Save the descriptors as `.npy`
     #[arg(long, alias = "save_descriptors")]
-    pub(super) save_descriptors: bool,
+    save_descriptors: bool,
     /// Name of the folder below `logs/` where results are saved
     #[arg(long, alias = "log_dir", default_value = "default", value_name = "NAME")]
-    pub(super) log_dir: String,
+    log_dir: String,
     /// Threads; all processors by default
     #[arg(long, alias = "num_workers", value_name = "N")]
     num_workers: Option<usize>,
-}
-
-/// The hand-crafted technique of this name; all others are networks.
-fn hand_crafted(method: &str) -> Option<HandCrafted> {
-    match method {
-        "hog" => Some(HandCrafted::Hog(HogParams::RELEASED)),
-        "hog-thesis" => Some(HandCrafted::Hog(HogParams::THESIS)),
-        "cohog" => Some(HandCrafted::CoHog(CoHogParams::default())),
-        _ => None,
-    }
-}
-
-/// The two sets with what was retrieved.
-pub(super) struct Retrieved {
-    pub(super) queries: Named,
-    pub(super) references: Named,
-    pub(super) ranking: Ranking,
-    /// The ranking by descriptors of single images, for networks whose descriptors depend on the batch.
-    alone: Option<Ranking>,
-    /// How sure the best match of each query is; higher is surer.
-    confidence: Vec<f64>,
-    /// Query and reference vectors, for techniques that have one per image.
-    pub(super) descriptors: Option<(Descriptors, Descriptors)>,
-    /// The truth that came with the images.
-    pub(super) truth: Option<GroundTruth>,
-}
-
-impl Retrieved {
-    /// What one description of queries and references gave.
-    fn new(
-        [queries, references]: [Named; 2],
-        ranking: Ranking,
-        confidence: Vec<f64>,
-        descriptors: Option<(Descriptors, Descriptors)>,
-    ) -> Self {
-        let (alone, truth) = (None, None);
-        Self { queries, references, ranking, alone, confidence, descriptors, truth }
-    }
 }
 
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
@@ -162,8 +126,20 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
             print_auc_pr(&retrieved, truth)?;
         }
     }
-    predictions::save(args, &retrieved, truth.as_ref())?;
+    predictions::save(&args.saving(), &retrieved, truth.as_ref())?;
     Ok(Outcome::Success)
+}
+
+impl EvaluateArgs {
+    /// What is saved, and where.
+    fn saving(&self) -> Saving<'_> {
+        Saving {
+            n_predictions: self.num_preds_to_save,
+            only_wrong: self.save_only_wrong_preds,
+            descriptors: self.save_descriptors,
+            log_dir: &self.log_dir,
+        }
+    }
 }
 
 /// `R@1: 98.8, R@5: 99.7, …`
@@ -201,9 +177,9 @@ fn from_folders(
 
 /// Describes and matches the images of a dataset.
 fn from_dataset(args: &EvaluateArgs, id: &str, k: usize) -> anyhow::Result<Retrieved> {
-    let data = Data::new(&args.data.data, Path::new("data"), &args.data.cache);
-    let dataset = data.images(id, &Bar::default())?;
-    let Some(dataset) = dataset else { bail!(data.why_absent(id, "images")?) };
+    let bar = Bar::default();
+    let sources = Sources::new([&*args.data.data, Path::new("data")], &args.data.cache, &bar);
+    let Some(dataset) = sources.images(id)? else { bail!(sources.why_absent(id, "images")?) };
     let (query_poses, reference_poses) = dataset.poses.clone().unzip();
     let named =
         |names: &[PathBuf], poses| Named { names: names.to_vec(), poses, zone: String::new() };
@@ -220,7 +196,7 @@ fn match_images(
     references: Named,
     k: usize,
 ) -> anyhow::Result<Retrieved> {
-    let Some(technique) = hand_crafted(&args.method) else {
+    let Some(Runner { technique, .. }) = hand_crafted(&args.method) else {
         return by_network(args, queries, references, k);
     };
     let bar = Bar::default();

@@ -2,12 +2,10 @@
 
 use std::path::Path;
 
-use bench::{data::Data, technique::Technique};
 use clap::ValueEnum;
-use vpr_core::{
-    cli::{self, DataArgs, Outcome},
-    metrics::catalogue::CATALOGUE,
-};
+use vpr_core::metrics::catalogue::CATALOGUE;
+use vpr_report::cli::{self, DataArgs, Outcome};
+use vpr_study::{Sources, Technique};
 
 /// What to list.
 #[derive(clap::Args)]
@@ -33,7 +31,7 @@ pub(crate) fn run(args: &ListArgs) -> anyhow::Result<Outcome> {
     let lines = match args.what {
         What::Techniques => techniques(),
         What::Datasets => {
-            datasets(&Data::new(&args.data.data, Path::new("data"), &args.data.cache))
+            datasets(&Sources::new([&*args.data.data, Path::new("data")], &args.data.cache, &()))?
         }
         What::Metrics => metrics(),
     };
@@ -52,10 +50,10 @@ fn techniques() -> Vec<String> {
     Technique::ALL.into_iter().map(line).collect()
 }
 
-fn datasets(data: &Data) -> Vec<String> {
+fn datasets(data: &Sources<'_>) -> vpr_core::Result<Vec<String>> {
     let mut lines = Vec::new();
     for entry in data.entries() {
-        let at_hand = if data.find(&entry.path).is_some() { "at hand" } else { "absent" };
+        let at_hand = if data.locate(&entry.path)?.is_some() { "at hand" } else { "absent" };
         let count = |n: Option<usize>| n.map_or_else(|| "-".to_owned(), |n| n.to_string());
         lines.push(format!(
             "{:<22}{:<9}{:>6} queries {:>6} references  {}",
@@ -71,7 +69,7 @@ fn datasets(data: &Data) -> Vec<String> {
         let origin = data.entry(&id).map_or_else(|err| err.to_string(), |entry| entry.origin);
         lines.push(format!("{id:<34}{origin}"));
     }
-    lines
+    Ok(lines)
 }
 
 fn metrics() -> Vec<String> {

@@ -1,12 +1,13 @@
 //! `bench match`: keypoints, matches and inliers of two images.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow};
 use clap::ValueEnum;
 use serde::Serialize;
-use vpr_core::cli::{self, DataArgs, Outcome};
-use vpr_nets::local;
+use vpr_data::DataRoots;
+use vpr_report::cli::{self, DataArgs, Outcome};
+use vpr_study::verification::LocalFeature;
 use vpr_vision::{
     features::{Extractor, LocalFeatures},
     image,
@@ -21,9 +22,11 @@ pub(crate) struct MatchArgs {
     a: PathBuf,
     /// The reference image
     b: PathBuf,
-    /// Local features
-    #[arg(long, value_enum, default_value_t = Method::Sift)]
-    method: Method,
+    /// Local features: sift, orb, or a network, whose weights lie in DIR/weights/ of `--data`:
+    /// xfeat (xfeat.pt), disk (disk-depth-save.pth), superpoint (`superpoint_v6_from_tf.pth`), delf
+    /// (delf.pth)
+    #[arg(long, default_value_t = LocalFeature::Sift, value_name = "NAME")]
+    method: LocalFeature,
     /// Weights of a network, .pt, .pth or .safetensors; by default DIR/weights/ of `--data`
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
@@ -58,22 +61,6 @@ pub(crate) struct MatchArgs {
     data: DataArgs,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Method {
-    /// SIFT, as OpenCV's
-    Sift,
-    /// ORB, as ORB-SLAM3's
-    Orb,
-    /// `XFeat`, weights `xfeat.pt`
-    Xfeat,
-    /// DISK, weights `disk-depth-save.pth`
-    Disk,
-    /// `SuperPoint`, weights `superpoint_v6_from_tf.pth`
-    Superpoint,
-    /// DELF-style attentive features, weights `delf.pth`
-    Delf,
-}
-
 #[derive(Clone, Copy, ValueEnum)]
 enum Geometry {
     /// A plane or a turning camera
@@ -87,30 +74,6 @@ enum Format {
     Text,
     Json,
     Csv,
-}
-
-impl Method {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Sift => "sift",
-            Self::Orb => "orb",
-            Self::Xfeat => "xfeat",
-            Self::Disk => "disk",
-            Self::Superpoint => "superpoint",
-            Self::Delf => "delf",
-        }
-    }
-
-    /// The file name of the published weights.
-    fn weights(self) -> Option<&'static str> {
-        match self {
-            Self::Sift | Self::Orb => None,
-            Self::Xfeat => Some("xfeat.pt"),
-            Self::Disk => Some("disk-depth-save.pth"),
-            Self::Superpoint => Some("superpoint_v6_from_tf.pth"),
-            Self::Delf => Some("delf.pth"),
-        }
-    }
 }
 
 pub(crate) fn run(args: &MatchArgs) -> anyhow::Result<Outcome> {
@@ -136,33 +99,32 @@ pub(crate) fn run(args: &MatchArgs) -> anyhow::Result<Outcome> {
             matches.len(),
             inliers.count()
         ),
-        Format::Json => json(method.name(), &features, &matches, &inliers)?,
+        Format::Json => json(args.method.name(), &features, &matches, &inliers)?,
         Format::Csv => csv(&features, &matches, &inliers),
     };
     cli::print(&text)?;
     Ok(Outcome::Success)
 }
 
+/// The features with their weights: those of `--weights`, or those of a data folder.
 fn extractor(args: &MatchArgs) -> anyhow::Result<Box<dyn Extractor>> {
-    let name = args.method.name();
-    let weights = match (args.method.weights(), &args.weights) {
-        (None, _) => None,
-        (Some(_), Some(path)) => Some(path.clone()),
-        (Some(file), None) => {
-            let path = args.data.data.join("weights").join(file);
-            let missing = || format!("{name} needs weights: give --weights FILE");
-            path.try_exists()
-                .ok()
-                .filter(|&it| it)
-                .with_context(|| format!("{}: not there; {}", path.display(), missing()))?;
-            Some(path)
+    let weights = match &args.weights {
+        Some(path) if args.method.is_learned() => Some(path.clone()),
+        Some(_) => None,
+        None => {
+            let roots = DataRoots::new([args.data.data.clone()]);
+            let name = args.method.name();
+            args.method.find_weights(&roots)?.map_err(|why| {
+                let folder = args.data.data.display();
+                anyhow!("{name}: {why} in {folder}; give --weights FILE")
+            })?
         }
     };
-    Ok(local::by_name(name, weights.as_deref().map(Path::new), args.features)?)
+    Ok(args.method.open(weights.as_deref(), args.features)?.extractor)
 }
 
 fn matching_params(args: &MatchArgs) -> MatchParams {
-    let learned = args.method.weights().is_some();
+    let learned = args.method.is_learned();
     match args.ratio {
         Some(ratio) => MatchParams { ratio: Some(ratio), ..MatchParams::RATIO },
         None if args.mutual || learned => MatchParams::MUTUAL,

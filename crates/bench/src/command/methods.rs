@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use vpr_core::cli::{self, DataArgs, Outcome};
 use vpr_nets::encode::{
     Interpolation, Size,
     registry::{Method, methods},
 };
+use vpr_report::cli::{self, DataArgs, Outcome};
 
 /// Say which networks there are, or everything about one.
 #[derive(clap::Args)]

@@ -3,10 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
-use vpr_core::{
-    Poses,
-    dataset::layout::{pose_csv::PoseTable, utm_names::UtmFolder, vpr_bench::image_folder},
-};
+use vpr_core::Poses;
+use vpr_data::layout::{numbered::images_in_order, pose_csv::PoseTable, utm_names::UtmFolder};
 
 /// Images of one side by name, with their poses if known.
 pub(super) struct Named {
@@ -21,8 +19,7 @@ impl Named {
     /// asked for.
     pub(super) fn folder(folder: &Path, needs_positions: bool) -> anyhow::Result<Self> {
         if !needs_positions {
-            let names =
-                image_folder(folder).or_else(|_| UtmFolder::open(folder).map(|it| it.images))?;
+            let names = images_in_order(folder)?;
             return Ok(Self { names, poses: None, zone: String::new() });
         }
         let images = UtmFolder::open(folder)?;

@@ -1,25 +1,38 @@
 //! What `bench evaluate` saves, laid out as VPR-methods-evaluation does.
 
-use std::{fmt::Write as _, fs, path::PathBuf};
+use std::{fmt::Write as _, fs, path::Path};
 
 use anyhow::Context;
-use vpr_core::{GroundTruth, cli, npy};
+use vpr_core::GroundTruth;
+use vpr_files::npy;
+use vpr_report::cli;
 
-use super::evaluate::{EvaluateArgs, Retrieved};
+use super::{log_folder, retrieved::Retrieved};
+
+/// What is saved, and where.
+#[derive(Clone, Copy)]
+pub(super) struct Saving<'a> {
+    /// Predictions per query.
+    pub(super) n_predictions: usize,
+    /// Only those of queries whose best reference is wrong.
+    pub(super) only_wrong: bool,
+    /// Whether descriptors are saved.
+    pub(super) descriptors: bool,
+    /// Name of the folder below `logs/`.
+    pub(super) log_dir: &'a str,
+}
 
 /// Saves predictions and descriptors below `logs/<log_dir>/<time>/`, if any are asked for.
 pub(super) fn save(
-    args: &EvaluateArgs,
+    saving: &Saving<'_>,
     retrieved: &Retrieved,
     truth: Option<&GroundTruth>,
 ) -> anyhow::Result<()> {
-    if args.num_preds_to_save == 0 && !args.save_descriptors {
+    if saving.n_predictions == 0 && !saving.descriptors {
         return Ok(());
     }
-    let time = jiff::Timestamp::now().strftime("%Y-%m-%d_%H-%M-%S").to_string();
-    let folder = PathBuf::from("logs").join(&args.log_dir).join(time);
-    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-    if args.save_descriptors {
+    let folder = log_folder::create(&Path::new("logs").join(saving.log_dir))?;
+    if saving.descriptors {
         let (queries, references) = retrieved
             .descriptors
             .as_ref()
@@ -27,18 +40,18 @@ pub(super) fn save(
         npy::write_f32(&folder.join("queries_descriptors.npy"), queries.view())?;
         npy::write_f32(&folder.join("database_descriptors.npy"), references.view())?;
     }
-    if args.num_preds_to_save > 0 {
+    if saving.n_predictions > 0 {
         let preds = folder.join("preds");
         fs::create_dir_all(&preds).with_context(|| preds.display().to_string())?;
         for query in 0..retrieved.queries.names.len() {
             let best = retrieved.ranking.indices(query)[0];
             let is_correct = truth.is_some_and(|truth| truth.is_correct(query, best));
-            if args.save_only_wrong_preds && is_correct {
+            if saving.only_wrong && is_correct {
                 continue;
             }
             let path = preds.join(format!("{query:03}.txt"));
-            let text = prediction(retrieved, truth, query, args.num_preds_to_save);
-            fs::write(&path, text).with_context(|| path.display().to_string())?;
+            let text = prediction(retrieved, truth, query, saving.n_predictions);
+            vpr_files::replace(&path, text.as_bytes())?;
         }
     }
     cli::note(&format!("saved in {}", folder.display()));

@@ -3,11 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use bench::data::Data;
-use vpr_core::{
-    cli::{self, Bar, DataArgs, Outcome},
-    dataset::{Severity, validate},
-};
+use vpr_data::{Severity, validate};
+use vpr_report::cli::{self, Bar, DataArgs, Outcome};
+use vpr_study::Sources;
 use vpr_vision::image;
 
 /// Which folder to look at.
@@ -53,8 +51,9 @@ fn folder(args: &ValidateArgs) -> anyhow::Result<PathBuf> {
     let Some(name) = name else {
         anyhow::bail!("{}: is not a folder", args.folder.display());
     };
-    let data = Data::new(&args.data.data, Path::new("data"), &args.data.cache);
-    let dataset = data.images(name, &Bar::default())?.context("a world has images")?;
+    let bar = Bar::default();
+    let sources = Sources::new([&*args.data.data, Path::new("data")], &args.data.cache, &bar);
+    let dataset = sources.images(name)?.context("a world has images")?;
     let image = dataset.queries.first().context("a world has queries")?;
     Ok(image.ancestors().nth(2).unwrap_or(image).to_owned())
 }

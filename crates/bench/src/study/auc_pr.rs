@@ -1,23 +1,22 @@
 //! AUC-PR of techniques on datasets: table 3.5.
 
-use vpr_core::{Definition, Error, Result, figure::Figure, table::Table};
+use vpr_core::{Definition, Error, Result, metrics::bootstrap::Resampling};
+use vpr_report::{figure::Figure, table::Table};
 
-use super::{
-    Context,
-    subject::{subjects, value_cell},
-};
+use super::Context;
 
 pub(super) fn run(
     table: &mut Table,
     datasets: &[String],
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
-    for subject in subjects(table, datasets, context)? {
+    let resampling = Resampling { seed: context.seed, ..Resampling::default() };
+    for subject in context.sources.subjects(table, datasets)? {
         let evaluation = subject.evaluation()?;
         for definition in [Definition::Published, Definition::Corrected] {
-            let value = evaluation.auc_pr(evaluation.positives(definition));
-            let cell = value_cell(&subject, &subject.row, subject.column, definition, value)?;
-            let cell = match evaluation.auc_pr_interval(definition, context.seed) {
+            let value = evaluation.auc_pr(definition);
+            let cell = subject.value_cell(&subject.row, subject.column, definition, value)?;
+            let cell = match evaluation.auc_pr_interval(definition, &resampling) {
                 Ok(interval) => cell.within(interval.low, interval.high, "bootstrap over queries"),
                 Err(Error::Undefined { .. }) => cell,
                 Err(err) => return Err(err),

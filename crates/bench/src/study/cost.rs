@@ -1,15 +1,15 @@
 //! Times and sizes of techniques: table 3.6.
 
 use serde::Deserialize;
-use vpr_core::{
-    Definition, Result,
+use vpr_core::{Definition, Provenance, Result};
+use vpr_report::{
     figure::Figure,
-    table::{Cell, Provenance, Table},
+    table::{Cell, Table},
 };
 use vpr_vision::{cohog::CoHogParams, hog::HogParams};
 
-use super::{Context, subject::runners};
-use crate::technique::Technique;
+use super::Context;
+use vpr_study::{Runner, Technique};
 
 /// The descriptor of a technique that does not run here, as the thesis states it.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -45,10 +45,10 @@ pub(super) fn run(
 fn times(table: &mut Table, timed_on: &[String], context: Context<'_>) -> Result<()> {
     networks(table);
     let images = if context.timings { context.first_images(timed_on)? } else { None };
-    for (column, technique) in runners(context)? {
+    for Runner { column, technique, .. } in context.sources.runners()? {
         let Some(images) = &images else {
             for row in [ENCODING, MATCHING] {
-                table.push(Cell::absent(row, column, "measured on request: --timings"));
+                table.push(Cell::absent(row, *column, "measured on request: --timings"));
             }
             continue;
         };
@@ -57,7 +57,7 @@ fn times(table: &mut Table, timed_on: &[String], context: Context<'_>) -> Result
         let provenance = images.provenance;
         let note = format!("median on one thread of this machine, {} images", images.name);
         for (row, value) in [(ENCODING, timing.encoding), (MATCHING, timing.matching * 1e3)] {
-            let cell = Cell::new(row, column, value, provenance, paths.len());
+            let cell = Cell::new(row, *column, value, provenance, paths.len());
             table.push(cell.noted(&note).timing());
         }
     }
@@ -82,21 +82,21 @@ const MATCHING: &str = "t_m, default (ms)";
 /// Times that the authors stored with their matches.
 fn stored_times(table: &mut Table, datasets: &[String], context: Context<'_>) -> Result<()> {
     for id in datasets {
-        let name = &context.data.entry(id)?.name;
+        let name = &context.sources.entry(id)?.name;
         for technique in Technique::ALL {
             let rows = [
                 format!("{ENCODING}, stored with {name}"),
                 format!("t_m (ms), stored with {name}"),
             ];
-            let Some(stored) = context.data.stored(id, technique)? else {
+            let Some(stored) = context.sources.stored(id, technique)? else {
                 for row in rows {
-                    let why = context.data.why_absent(id, "stored matches")?;
+                    let why = context.sources.why_absent(id, "stored matches")?;
                     table.push(Cell::absent(row, technique.name(), why));
                 }
                 continue;
             };
             let values = [stored.timing.encoding, stored.timing.matching * 1e3];
-            let n = stored.similarities.n_queries();
+            let n = stored.scores.similarities().n_queries();
             for (row, value) in rows.into_iter().zip(values) {
                 let cell = Cell::new(row, technique.name(), value, Provenance::Published, n);
                 table.push(cell.noted(match technique {

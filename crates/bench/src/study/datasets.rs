@@ -2,15 +2,15 @@
 
 use std::path::PathBuf;
 
-use vpr_core::{
-    Result,
+use vpr_core::{Provenance, Result};
+use vpr_report::{
     figure::Figure,
-    table::{Cell, Provenance, Table},
+    table::{Cell, Table},
 };
 use vpr_vision::image;
 
 use super::Context;
-use crate::technique::Technique;
+use vpr_study::Technique;
 
 pub(super) fn run(
     table: &mut Table,
@@ -18,10 +18,10 @@ pub(super) fn run(
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
     for id in datasets {
-        let row = context.data.entry(id)?.name.clone();
+        let row = context.sources.entry(id)?.name.clone();
         let images = context.images(id)?;
-        let provenance = context.data.provenance(id)?;
-        let why = context.data.why_absent(id, "images")?;
+        let provenance = context.sources.provenance(id)?;
+        let why = context.sources.why_absent(id, "images")?;
         if let Some(images) = images.as_deref() {
             for (column, paths) in
                 [("Queries", &images.queries), ("References", &images.references)]
@@ -32,7 +32,7 @@ pub(super) fn run(
             table.push(resolution(&row, "Ref Res.", &images.references, provenance)?);
             continue;
         }
-        match context.data.ground_truth(id)? {
+        match context.sources.ground_truth(id)? {
             Some(truth) => {
                 let n = truth.len();
                 let note = "rows of the published ground truth";
@@ -41,9 +41,9 @@ pub(super) fn run(
             }
             None => table.push(Cell::absent(&row, "Queries", &why)),
         }
-        match context.data.stored(id, Technique::Hog)? {
+        match context.sources.stored(id, Technique::Hog)? {
             Some(stored) => {
-                let n = stored.similarities.n_references();
+                let n = stored.scores.similarities().n_references();
                 let note = "columns of the stored score matrices";
                 let cell = Cell::new(&row, "References", n as f64, Provenance::Published, n);
                 table.push(cell.noted(note));

@@ -1,18 +1,18 @@
 //! AUC-PR, size and matching time over descriptor size: table 3.9.
 
-use vpr_core::{
-    Definition, Result,
-    dataset::Dataset,
+use std::sync::Arc;
+
+use vpr_core::{Definition, Provenance, Result};
+use vpr_data::Dataset;
+use vpr_report::{
     figure::Figure,
-    table::{Cell, Provenance, Table},
+    table::{Cell, Table},
 };
 use vpr_vision::{cohog::CoHogParams, hog::HogParams};
 
-use super::{
-    Context,
-    subject::{Subject, match_images, value_cell},
-};
-use crate::technique::{Describe as _, HandCrafted};
+use vpr_study::{Describe as _, Direction, HandCrafted, Runner, Subject};
+
+use super::Context;
 
 /// What is swept.
 pub(super) struct Sweep<'a> {
@@ -53,12 +53,12 @@ pub(super) fn run(
         }
     }
     for id in datasets {
-        let name = context.data.entry(id)?.name.clone();
+        let name = context.sources.entry(id)?.name.clone();
         for &cell in sweep.cell_sizes {
             let row = format!("{cell}x{cell}, {name}");
             let Some(dataset) = context.images(id)? else {
                 for (column, _) in at_cell_size(cell) {
-                    let why = context.data.why_absent(id, "images")?;
+                    let why = context.sources.why_absent(id, "images")?;
                     table.push(Cell::absent(&row, format!("{column} AUC"), why));
                 }
                 continue;
@@ -105,20 +105,20 @@ fn measure(
     dataset: &Dataset,
     context: Context<'_>,
 ) -> Result<()> {
-    let scores = match_images(technique, column, dataset, false, context)?;
-    let subject = Subject {
-        row: row.to_owned(),
+    let runner = Runner {
+        name: column.to_owned(),
         column,
-        provenance: dataset.provenance,
-        best: scores.similarities.best(),
-        similarities: scores.similarities.clone(),
-        truth: dataset.truth.clone(),
-        note: scores.note.clone(),
+        encoder: column.to_owned(),
+        technique: Arc::new(technique.clone()),
     };
+    let scores = context.sources.scores(&runner, dataset, Direction::AsReleased)?;
+    let note = scores.note().map(str::to_owned);
+    let truth = Arc::new(dataset.truth.clone());
+    let subject = Subject::new(row, column, dataset.provenance, scores, truth)?.noted(note);
     let evaluation = subject.evaluation()?;
     for definition in [Definition::Published, Definition::Corrected] {
-        let value = evaluation.auc_pr(evaluation.positives(definition));
-        table.push(value_cell(&subject, row, &format!("{column} AUC"), definition, value)?);
+        let value = evaluation.auc_pr(definition);
+        table.push(subject.value_cell(row, &format!("{column} AUC"), definition, value)?);
     }
     if context.timings {
         let paths = &dataset.queries[..dataset.queries.len().min(TIMED)];

@@ -1,21 +1,21 @@
 //! Scores under growing variation and the area between the curves: figure 3.19.
 
-use std::{collections::BTreeMap, path::PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use serde::Deserialize;
-use vpr_core::{
-    Definition, Result, Similarities,
-    dataset::layout::vpr_bench::{image_folder, read_curves},
+use vpr_core::{Definition, Provenance, Result, Similarities, metrics::area_between_curves};
+use vpr_data::layout::vpr_bench::{image_folder, read_curves};
+use vpr_report::{
     figure::{Curve, Figure, Panel},
-    metrics::area_between_curves,
-    table::{Cell, Provenance, Table},
+    table::{Cell, Table},
 };
 
-use super::{
-    Context,
-    subject::{match_images, runners},
-};
-use crate::technique::{Describe, Technique};
+use vpr_study::{Describe, Direction, Runner, Technique};
+
+use super::Context;
 
 /// The kinds of variation and the files of their stored curves: same place, other place.
 const VARIATIONS: [(&str, &str, &str); 2] = [
@@ -87,8 +87,9 @@ fn published(
     (variation, (same, other)): (&str, (&str, &str)),
     context: Context<'_>,
 ) -> Result<()> {
-    let folder = context.data.entry(stored)?.path;
-    let files = (context.data.find(folder.join(same)), context.data.find(folder.join(other)));
+    let folder = context.sources.entry(stored)?.path;
+    let file = |name: &str| context.sources.locate(&folder.join(name));
+    let files = (file(same)?, file(other)?);
     if let (Some(same), Some(other)) = files {
         let (same, other) = (read_curves(&same)?, read_curves(&other)?);
         for (technique, curves) in paired(&same, &other) {
@@ -98,7 +99,7 @@ fn published(
         return Ok(());
     }
     for technique in &Technique::ALL[..8] {
-        let why = context.data.why_absent(stored, "stored curves")?;
+        let why = context.sources.why_absent(stored, "stored curves")?;
         table.push(Cell::absent(technique.name(), format!("{variation} ABC"), why));
     }
     Ok(())
@@ -113,14 +114,15 @@ fn on_stage(
 ) -> Result<()> {
     let variation = stage.variation.as_str();
     let Some(dataset) = context.images(&stage.dataset)? else {
-        let why = context.data.why_absent(&stage.dataset, "images")?;
-        let row = context.data.entry(&stage.dataset)?.name;
+        let why = context.sources.why_absent(&stage.dataset, "images")?;
+        let row = context.sources.entry(&stage.dataset)?.name;
         table.push(Cell::absent(row, format!("{variation} ABC"), why));
         return Ok(());
     };
-    for (column, technique) in runners(context)? {
-        let scores = match_images(technique.as_ref(), column, &dataset, true, context)?;
-        let curves = halves(&scores.similarities);
+    for runner in context.sources.runners()? {
+        let column = runner.column;
+        let scores = context.sources.scores(runner, &dataset, Direction::Swapped)?;
+        let curves = halves(scores.similarities());
         let row = format!("{column}, {}", dataset.name);
         report(table, figure, &row, variation, &curves, dataset.provenance)?;
     }
@@ -155,24 +157,24 @@ fn measure(
     variation: &str,
     context: Context<'_>,
 ) -> Result<()> {
-    let entry = context.data.entry(id)?;
+    let entry = context.sources.entry(id)?;
     let folder = |place: &str| {
-        let parent = entry.path.parent()?;
-        context.data.find(parent.join("invariance").join(variation).join(place))
+        let parent = entry.path.parent().unwrap_or(Path::new(""));
+        context.sources.locate(&parent.join("invariance").join(variation).join(place))
     };
-    let (Some(same), Some(other)) = (folder("same"), folder("other")) else {
-        let why = context.data.why_absent(id, "image series")?;
+    let (Some(same), Some(other)) = (folder("same")?, folder("other")?) else {
+        let why = context.sources.why_absent(id, "image series")?;
         table.push(Cell::absent(&entry.name, format!("{variation} ABC"), why));
         return Ok(());
     };
     let (same, other) = (image_folder(&same)?, image_folder(&other)?);
-    for (column, technique) in runners(context)? {
+    for Runner { column, technique, .. } in context.sources.runners()? {
         let curves = Curves {
             same: scores(technique.as_ref(), &same[..1], &same)?,
             other: scores(technique.as_ref(), &same[..1], &other)?,
         };
         let row = format!("{column}, {}", entry.name);
-        report(table, figure, &row, variation, &curves, context.data.provenance(id)?)?;
+        report(table, figure, &row, variation, &curves, context.sources.provenance(id)?)?;
     }
     Ok(())
 }

@@ -1,9 +1,9 @@
 //! The 19 lights of the Point Features dataset: table 3.4.
 
-use vpr_core::{
-    Definition,
+use vpr_core::{Definition, Provenance};
+use vpr_report::{
     figure::Figure,
-    table::{Cell, Provenance, Table},
+    table::{Cell, Table},
 };
 
 /// Azimuth and elevation of each light in degrees, about the centre of the table (Aanæs et al.).

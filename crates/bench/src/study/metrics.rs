@@ -1,9 +1,9 @@
 //! The taxonomy of metrics: table 3.3.
 
-use vpr_core::{
+use vpr_core::{Provenance, metrics::catalogue::CATALOGUE};
+use vpr_report::{
     figure::Figure,
-    metrics::catalogue::CATALOGUE,
-    table::{Cell, Provenance, Table},
+    table::{Cell, Table},
 };
 
 pub(super) fn run(table: &mut Table) -> Option<Figure> {

@@ -13,7 +13,6 @@ mod range;
 mod recall_curves;
 mod roc;
 mod spacing;
-mod subject;
 mod swap;
 mod tolerances;
 mod verification;
@@ -22,19 +21,21 @@ mod worlds;
 use std::sync::Arc;
 
 use serde::Deserialize;
-use vpr_core::{
-    Observer, Result,
-    dataset::Dataset,
+use vpr_core::{Observer, Provenance, Result};
+use vpr_data::Dataset;
+use vpr_report::{
     experiment::Experiment,
     figure::{Figure, Panel},
-    table::{Provenance, Table},
+    page::Report,
+    table::Table,
 };
 
 pub use invariance::Stage;
-pub use platform_speed::TechniqueTiming;
-pub use worlds::{Dial, Domain, Likeness, Worlds};
+pub use vpr_study::Dial;
+use vpr_study::Sources;
 
-use crate::data::Data;
+pub use platform_speed::TechniqueTiming;
+pub use worlds::{Domain, Likeness, Worlds};
 
 /// What to compute; the key `kind` of `[study]` chooses.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -150,22 +151,11 @@ pub enum Study {
     },
 }
 
-/// What a study made: numbers, and a drawing of them if it is a figure.
-#[derive(Clone, Debug)]
-pub struct Report {
-    /// The numbers.
-    pub table: Table,
-    /// The drawing.
-    pub figure: Option<Figure>,
-}
-
 /// What every study is given.
 #[derive(Clone, Copy)]
 pub struct Context<'a> {
-    /// The data at hand.
-    pub data: &'a Data,
-    /// Told about progress.
-    pub observer: &'a dyn Observer,
+    /// Datasets, techniques and what was computed before.
+    pub sources: &'a Sources<'a>,
     /// Whether to measure what differs from run to run.
     pub timings: bool,
     /// Seed of the bootstrap.
@@ -185,7 +175,7 @@ impl Context<'_> {
 
     /// The images of a dataset, if at hand.
     fn images(&self, id: &str) -> Result<Option<Arc<Dataset>>> {
-        self.data.images(id, self.observer)
+        self.sources.images(id)
     }
 }
 
@@ -257,5 +247,5 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         Study::Roc { datasets, curves } => roc::run(&mut table, datasets, *curves, context)?,
     };
     experiment.fill_thesis(&mut table);
-    Ok(Report { table, figure })
+    Ok(Report::new(table, figure))
 }

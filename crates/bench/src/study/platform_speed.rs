@@ -2,13 +2,17 @@
 
 use serde::Deserialize;
 use vpr_core::{
-    Result,
-    figure::{Curve, Figure, Panel},
+    Provenance, Result,
     metrics::{SearchCost, Timing, required_fps, retrieval_time, speed_limit},
-    table::{Cell, Provenance, Table},
+};
+use vpr_report::{
+    figure::{Curve, Figure, Panel},
+    table::{Cell, Table},
 };
 
-use super::{Context, subject::runners};
+use vpr_study::Runner;
+
+use super::Context;
 
 /// The times of one technique, as somebody published them.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -50,7 +54,7 @@ pub(super) fn run(
         figure.panels.push(panel(name, timing, &drive)?);
     }
     let images = if context.timings { context.first_images(timed_on)? } else { None };
-    for (column, technique) in runners(context)? {
+    for Runner { column, technique, .. } in context.sources.runners()? {
         let row = format!("{column}, this machine");
         let Some(images) = &images else {
             for &size in drive.map_sizes {

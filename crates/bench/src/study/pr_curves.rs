@@ -1,17 +1,17 @@
 //! Precision–recall curves and what is read off them: figure 3.10.
 
 use vpr_core::{
-    Definition, Error, Result,
+    Definition, Error, Evaluation, Result,
+    metrics::{self, Positives},
+};
+use vpr_report::{
     figure::{Curve, Figure, Panel},
-    metrics,
     table::Table,
 };
 
-use super::{
-    Context,
-    subject::{Subject, push_both, subjects},
-};
-use crate::evaluate::{Evaluation, Positives};
+use vpr_study::Subject;
+
+use super::Context;
 
 /// Recalls at which the curves are sampled.
 const RECALLS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
@@ -22,7 +22,7 @@ pub(super) fn run(
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
     let mut figure = Figure::default();
-    for subject in subjects(table, datasets, context)? {
+    for subject in context.sources.subjects(table, datasets)? {
         let evaluation = subject.evaluation()?;
         summarize(table, &subject, &evaluation)?;
         match curve(&evaluation) {
@@ -48,7 +48,7 @@ fn panel() -> Panel {
 fn curve(evaluation: &Evaluation<'_>) -> Result<Vec<(f64, f64)>> {
     let curve = metrics::precision_recall_curve(
         evaluation.confidence(),
-        evaluation.correct(),
+        evaluation.judged().correct(),
         Positives::Published,
     )?;
     Ok(curve.recall.into_iter().zip(curve.precision).rev().collect())
@@ -57,31 +57,28 @@ fn curve(evaluation: &Evaluation<'_>) -> Result<Vec<(f64, f64)>> {
 /// The numbers VPR-Bench summarises a curve by, each under both definitions.
 fn summarize(table: &mut Table, subject: &Subject, evaluation: &Evaluation<'_>) -> Result<()> {
     let row = subject.label();
-    let (confidence, correct) = (evaluation.confidence(), evaluation.correct());
-    let positives = |definition| evaluation.positives(definition);
-    push_both(table, subject, &row, "AUC-PR", |it| evaluation.auc_pr(positives(it)))?;
-    push_both(table, subject, &row, "average precision", |it| {
-        evaluation.average_precision(positives(it))
-    })?;
-    push_both(table, subject, &row, "EP", |it| {
+    let (confidence, correct) = (evaluation.confidence(), evaluation.judged().correct());
+    let positives = |definition| evaluation.judged().positives(definition);
+    subject.push_both(table, &row, "AUC-PR", |it| evaluation.auc_pr(it))?;
+    subject.push_both(table, &row, "average precision", |it| evaluation.average_precision(it))?;
+    subject.push_both(table, &row, "EP", |it| {
         metrics::extended_precision(confidence, correct, positives(it))
     })?;
-    push_both(table, subject, &row, "AUC-ROC", |it| {
-        let positive = metrics::roc_positives(it, &subject.best.reference, &subject.truth)?;
+    subject.push_both(table, &row, "AUC-ROC", |it| {
+        let positive = metrics::roc_positives(it, &subject.best().reference, &subject.truth)?;
         metrics::auc_roc(confidence, &positive)
     })?;
-    push_both(table, subject, &row, "P@100%R", |it| {
+    subject.push_both(table, &row, "P@100%R", |it| {
         metrics::precision_at_full_recall(it, confidence, correct)
     })?;
-    push_both(table, subject, &row, "R@100%P", |it| {
+    subject.push_both(table, &row, "R@100%P", |it| {
         metrics::recall_at_precision(1.0, confidence, correct, positives(it))
     })?;
-    push_both(table, subject, &row, "R@95%P", |it| {
+    subject.push_both(table, &row, "R@95%P", |it| {
         metrics::recall_at_precision(0.95, confidence, correct, positives(it))
     })?;
-    push_both(table, subject, &row, "F1 max", |it| {
-        metrics::f1_max(confidence, correct, positives(it))
-    })
+    subject
+        .push_both(table, &row, "F1 max", |it| metrics::f1_max(confidence, correct, positives(it)))
 }
 
 /// Precision where recall first reaches each of [`RECALLS`].

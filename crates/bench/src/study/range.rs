@@ -1,16 +1,12 @@
 //! AUC-PR over the accepted range of frames: figure 3.17.
 
-use vpr_core::{
-    GroundTruth, Result,
+use vpr_core::{Definition, Error, GroundTruth, Result};
+use vpr_report::{
     figure::{Curve, Figure, Panel},
     table::Table,
 };
 
-use super::{
-    Context,
-    subject::{Subject, push_both, subjects},
-};
-use crate::evaluate::Positives;
+use super::Context;
 
 pub(super) fn run(
     table: &mut Table,
@@ -19,27 +15,19 @@ pub(super) fn run(
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
     let mut figure = Figure::default();
-    for subject in subjects(table, datasets, context)? {
+    for subject in context.sources.subjects(table, datasets)? {
         let mut points = Vec::new();
         for &tolerance in tolerances {
-            let (n_queries, n_references) =
-                (subject.similarities.n_queries(), subject.similarities.n_references());
+            let similarities = subject.scores.similarities();
+            let (n_queries, n_references) = (similarities.n_queries(), similarities.n_references());
             let truth = GroundTruth::within_frames(n_queries, n_references, tolerance);
-            let subject = Subject {
-                row: format!("{} ±{tolerance}", subject.row),
-                column: subject.column,
-                provenance: subject.provenance,
-                similarities: subject.similarities.clone(),
-                best: subject.best.clone(),
-                truth,
-                note: subject.note.clone(),
-            };
+            let subject = subject.under(&format!("{} ±{tolerance}", subject.row), truth)?;
             let evaluation = subject.evaluation()?;
-            push_both(table, &subject, &subject.row, subject.column, |it| {
-                evaluation.auc_pr(evaluation.positives(it))
-            })?;
-            if let Ok(published) = evaluation.auc_pr(Positives::Published) {
-                points.push((tolerance as f64, published));
+            subject.push_both(table, &subject.row, subject.column, |it| evaluation.auc_pr(it))?;
+            match evaluation.auc_pr(Definition::Published) {
+                Ok(published) => points.push((tolerance as f64, published)),
+                Err(Error::Undefined { .. }) => {}
+                Err(err) => return Err(err),
             }
         }
         let name = format!("{}{}", subject.column, super::origin_mark(subject.provenance));

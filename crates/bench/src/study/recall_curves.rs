@@ -1,13 +1,14 @@
 //! RecallRate@N: figure 3.11.
 
-use vpr_core::{
-    Result,
+use vpr_core::Result;
+use vpr_report::{
     figure::{Curve, Figure, Panel},
     table::Table,
 };
 
-use super::{Context, subject::subjects};
-use crate::evaluate::MAX_RANK;
+use vpr_study::MAX_RANK;
+
+use super::Context;
 
 pub(super) fn run(
     table: &mut Table,
@@ -15,11 +16,10 @@ pub(super) fn run(
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
     let mut figure = Figure::default();
-    for subject in subjects(table, datasets, context)? {
-        let evaluation = subject.evaluation()?;
+    for subject in context.sources.subjects(table, datasets)? {
         let mut points = Vec::new();
         for n in 1..=MAX_RANK {
-            let recall = evaluation.recall_at(n)?;
+            let recall = subject.recall_at(n)?;
             table.push(subject.cell(&subject.label(), &format!("R@{n}"), recall));
             points.push((n as f64, recall));
         }

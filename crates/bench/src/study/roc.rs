@@ -1,16 +1,14 @@
 //! ROC curves and their areas, where some queries are new places: figure 3.13 and table 3.7.
 
-use vpr_core::{
-    Definition, Error, Result,
+use vpr_core::{Definition, Error, Result, metrics};
+use vpr_report::{
     figure::{Curve, Figure, Panel},
-    metrics,
     table::Table,
 };
 
-use super::{
-    Context,
-    subject::{Subject, push_both, subjects, value_cell},
-};
+use vpr_study::Subject;
+
+use super::Context;
 
 /// False-positive rates at which the curves are sampled.
 const RATES: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.6];
@@ -22,10 +20,10 @@ pub(super) fn run(
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
     let mut figure = Figure::default();
-    for subject in subjects(table, datasets, context)? {
+    for subject in context.sources.subjects(table, datasets)? {
         let area =
             |definition| metrics::auc_roc(confidence(&subject), &positive(&subject, definition)?);
-        push_both(table, &subject, &subject.row, subject.column, area)?;
+        subject.push_both(table, &subject.row, subject.column, area)?;
         if !curves {
             continue;
         }
@@ -40,7 +38,7 @@ pub(super) fn run(
         for rate in RATES {
             let column = format!("TPR at FPR={rate}");
             let reached = Ok(highest(&points, rate));
-            table.push(value_cell(&subject, &subject.label(), &column, definition, reached)?);
+            table.push(subject.value_cell(&subject.label(), &column, definition, reached)?);
         }
         let name = format!("{}{}", subject.column, super::origin_mark(subject.provenance));
         super::panel_of(&mut figure, &subject.row, panel).curves.push(Curve { name, points });
@@ -49,11 +47,11 @@ pub(super) fn run(
 }
 
 fn confidence(subject: &Subject) -> &[f64] {
-    &subject.best.confidence
+    &subject.best().confidence
 }
 
 fn positive(subject: &Subject, definition: Definition) -> Result<Vec<bool>> {
-    metrics::roc_positives(definition, &subject.best.reference, &subject.truth)
+    metrics::roc_positives(definition, &subject.best().reference, &subject.truth)
 }
 
 /// The highest true-positive rate at a false-positive rate of at most `rate`.

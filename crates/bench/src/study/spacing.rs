@@ -1,16 +1,14 @@
 //! Distances between consecutive true positives along a traverse: figure 3.14.
 
-use vpr_core::{
-    Definition, Result,
+use vpr_core::{Definition, Result, metrics};
+use vpr_report::{
     figure::{Curve, Figure, Panel},
-    metrics,
     table::Table,
 };
 
-use super::{
-    Context,
-    subject::{Subject, subjects},
-};
+use vpr_study::Subject;
+
+use super::Context;
 
 /// Distances listed one by one; longer ones are counted together.
 const LISTED: usize = 8;
@@ -21,10 +19,9 @@ pub(super) fn run(
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
     let mut figure = Figure::default();
-    for subject in subjects(table, datasets, context)? {
-        let evaluation = subject.evaluation()?;
+    for subject in context.sources.subjects(table, datasets)? {
         for definition in [Definition::Published, Definition::Corrected] {
-            let counts = metrics::true_positive_spacing(definition, evaluation.correct())?;
+            let counts = metrics::true_positive_spacing(definition, subject.judged.correct())?;
             list(table, &subject, definition, &counts);
             if definition == Definition::Corrected {
                 let points =

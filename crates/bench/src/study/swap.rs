@@ -1,16 +1,16 @@
 //! Queries and references exchanged: figure 3.15.
 
-use vpr_core::{
-    Result,
+use std::sync::Arc;
+
+use vpr_core::{Definition, Error, Result};
+use vpr_report::{
     figure::{Curve, Figure, Panel},
-    table::{Cell, Table},
+    table::Table,
 };
 
-use super::{
-    Context,
-    subject::{Subject, computed, push_both, stored, subjects},
-};
-use crate::{evaluate::Positives, technique::Technique};
+use vpr_study::{Direction, Subject, Technique};
+
+use super::Context;
 
 pub(super) fn run(
     table: &mut Table,
@@ -19,17 +19,17 @@ pub(super) fn run(
 ) -> Result<Option<Figure>> {
     let mut figure = Figure::default();
     for (suffix, x, subjects) in [
-        ("", 0.0, subjects(table, datasets, context)?),
+        ("", 0.0, context.sources.subjects(table, datasets)?),
         (", swapped", 1.0, swapped(table, datasets, context)?),
     ] {
         for subject in subjects {
             let evaluation = subject.evaluation()?;
             let row = format!("{}{suffix}", subject.row);
-            push_both(table, &subject, &row, subject.column, |it| {
-                evaluation.auc_pr(evaluation.positives(it))
-            })?;
-            if let Ok(published) = evaluation.auc_pr(Positives::Published) {
-                draw(&mut figure, &subject, x, published);
+            subject.push_both(table, &row, subject.column, |it| evaluation.auc_pr(it))?;
+            match evaluation.auc_pr(Definition::Published) {
+                Ok(published) => draw(&mut figure, &subject, x, published),
+                Err(Error::Undefined { .. }) => {}
+                Err(err) => return Err(err),
             }
         }
     }
@@ -41,27 +41,20 @@ fn swapped(table: &mut Table, datasets: &[String], context: Context<'_>) -> Resu
     let mut subjects = Vec::new();
     for id in datasets {
         let before = subjects.len();
-        for subject in stored(id, context)? {
-            let similarities = subject.similarities.swapped();
+        for subject in context.sources.stored_subjects(id)? {
             let is_symmetric = subject.column != Technique::CoHog.name();
-            subjects.push(Subject {
-                best: similarities.best(),
-                similarities,
-                truth: subject.truth.swapped(),
-                note: (!is_symmetric).then(|| {
-                    "the stored scores weight regions of the query; exchanged they still do"
-                        .to_owned()
-                }),
-                ..subject
+            let note = (!is_symmetric).then(|| {
+                "the stored scores weight regions of the query; exchanged they still do".to_owned()
             });
+            let scores = Arc::new(subject.scores.swapped(None));
+            let truth = Arc::new(subject.truth.swapped());
+            let (row, column, provenance) = (&subject.row, subject.column, subject.provenance);
+            subjects.push(Subject::new(row, column, provenance, scores, truth)?.noted(note));
         }
-        subjects.extend(computed(id, true, context)?);
+        subjects.extend(context.sources.computed_subjects(id, Direction::Swapped)?);
         if subjects.len() == before {
-            let row = format!("{}, swapped", context.data.entry(id)?.name);
-            let why = context.data.why_absent(id, "stored matches or images")?;
-            for technique in Technique::ALL {
-                table.push(Cell::absent(&row, technique.name(), &why));
-            }
+            let row = format!("{}, swapped", context.sources.entry(id)?.name);
+            context.sources.push_absent(table, id, &row)?;
         }
     }
     Ok(subjects)

@@ -1,10 +1,10 @@
 //! Tolerances that the published ground truths really have: table 3.2.
 
-use vpr_core::{
-    GroundTruth, Result,
-    dataset::{Tolerance, layout::vpr_bench::GroundTruthFile},
+use vpr_core::{GroundTruth, Provenance, Result};
+use vpr_data::{Tolerance, layout::vpr_bench::GroundTruthFile};
+use vpr_report::{
     figure::Figure,
-    table::{Cell, Provenance, Table},
+    table::{Cell, Table},
 };
 
 use super::Context;
@@ -18,19 +18,21 @@ pub(super) fn run(
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
     for id in datasets {
-        let row = context.data.entry(id)?.name;
+        let row = context.sources.entry(id)?.name;
         if vpr_worlds::is_world(id) {
             generated(table, &row, id, context)?;
             continue;
         }
-        let Some(file) = context.data.ground_truth(id)? else {
-            table.push(Cell::absent(row, COLUMN, context.data.why_absent(id, "ground truth")?));
+        let Some(file) = context.sources.ground_truth(id)? else {
+            table.push(Cell::absent(row, COLUMN, context.sources.why_absent(id, "ground truth")?));
             continue;
         };
         let n = file.len();
-        let provenance =
-            if id == "fixture" { Provenance::Generated } else { Provenance::Published };
-        if let Tolerance::Metres(_) = context.data.entry(id)?.tolerance {
+        let provenance = match context.sources.provenance(id)? {
+            Provenance::Generated => Provenance::Generated,
+            _ => Provenance::Published,
+        };
+        if let Tolerance::Metres(_) = context.sources.entry(id)?.tolerance {
             let why = "metres cannot be checked: the published lists come without positions";
             table.push(Cell::absent(&row, COLUMN, why));
         } else {
@@ -64,7 +66,7 @@ fn generated(table: &mut Table, row: &str, id: &str, context: Context<'_>) -> Re
             some => some.iter().filter_map(|&reference| i64::try_from(reference).ok()).collect(),
         })
         .collect();
-    let (text, remark) = match (context.data.entry(id)?.tolerance, &dataset.poses) {
+    let (text, remark) = match (context.sources.entry(id)?.tolerance, &dataset.poses) {
         (Tolerance::Metres(radius), Some((queries, references))) => {
             let follows = GroundTruth::within_radius(queries, references, radius)? == *truth;
             let remark = if follows { "" } else { "its lists do not follow from the positions" };

@@ -10,16 +10,18 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Deserialize;
 use vpr_core::{
-    Pose, Result,
-    dataset::layout::seven_scenes,
-    figure::Figure,
+    Pose, Provenance, Result,
     metrics::{
         auc_roc,
         bootstrap::{self, Resampling},
     },
-    table::{Cell, Provenance, Table},
 };
-use vpr_nets::local;
+use vpr_data::layout::seven_scenes;
+use vpr_report::{
+    figure::Figure,
+    table::{Cell, Table},
+};
+use vpr_study::verification::{LocalFeature, Opened};
 use vpr_vision::{
     features::{Extractor, LocalFeatures},
     image::{self, ImageSize, resize_bilinear},
@@ -47,10 +49,8 @@ pub struct Pairs {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LocalMethod {
-    /// Name of the features.
-    pub features: String,
-    /// File below `weights/` of the data folder, if they need one.
-    pub weights: Option<PathBuf>,
+    /// The features.
+    pub features: LocalFeature,
     /// Keypoints per image.
     pub keypoints: usize,
     /// Ways of matching, each a row of the table.
@@ -86,21 +86,25 @@ pub(super) fn run(
     methods: &[LocalMethod],
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
-    let folder = context.data.find(&context.data.entry(dataset)?.path);
+    let folder = context.sources.locate(&context.sources.entry(dataset)?.path)?;
     let found = folder.as_deref().map(|folder| open(folder, pairs, context.seed)).transpose()?;
     for method in methods {
         let mut absent = |why: &str| {
             method.rows.iter().for_each(|row| table.push(Cell::absent(&row.name, COLUMN, why)));
         };
         let Some((images, found)) = &found else {
-            absent(&context.data.why_absent(dataset, "images")?);
+            absent(&context.sources.why_absent(dataset, "images")?);
             continue;
         };
-        let Some(extractor) = extractor(method, context)? else {
-            let file = method.weights.as_deref().unwrap_or(Path::new("")).display();
-            absent(&format!("weights/{file} is not at hand"));
-            continue;
+        let weights = match method.features.find_weights(context.sources.roots())? {
+            Ok(weights) => weights,
+            Err(why) => {
+                absent(&why);
+                continue;
+            }
         };
+        let Opened { extractor, .. } =
+            method.features.open(weights.as_deref(), method.keypoints)?;
         let features = describe(&*extractor, images, found, pairs.width, context)?;
         for row in &method.rows {
             let counts = count(&features, found, row.matching())?;
@@ -117,21 +121,6 @@ fn open(folder: &Path, pairs: Pairs, seed: u64) -> Result<(Vec<PathBuf>, Vec<Pai
     let (queries, references) = seven_scenes::open(folder)?;
     let poses = [references.poses.six_dof()?, queries.poses.six_dof()?].concat();
     Ok(([references.images, queries.images].concat(), sample(&poses, pairs, seed)))
-}
-
-fn extractor(method: &LocalMethod, context: Context<'_>) -> Result<Option<Box<dyn Extractor>>> {
-    let path = match &method.weights {
-        None => None,
-        Some(file) => match context.data.find(PathBuf::from("weights").join(file)) {
-            None => return Ok(None),
-            found => found,
-        },
-    };
-    let made = local::by_name(&method.features, path.as_deref(), method.keypoints);
-    made.map(Some).map_err(|error| match error {
-        vpr_nets::Error::Core(error) => error,
-        other => vpr_core::Error::format(path.unwrap_or_default(), "weights", other.to_string()),
-    })
 }
 
 /// The same number of near and far pairs, drawn by the seed; fewer if there are not so many.
@@ -174,7 +163,7 @@ fn describe(
     let mut needed: Vec<usize> = pairs.iter().flat_map(|(pair, _)| *pair).collect();
     needed.sort_unstable();
     needed.dedup();
-    context.observer.start(extractor.name(), needed.len());
+    context.sources.observer().start(extractor.name(), needed.len());
     let one = |&index: &usize| {
         let mut picture = image::decode(&images[index])?;
         if picture.width() > width {
@@ -182,12 +171,12 @@ fn describe(
             picture = resize_bilinear(&picture, ImageSize { width, height })?;
         }
         let features = extractor.extract(&picture)?;
-        context.observer.step();
+        context.sources.observer().step();
         Ok((index, features))
     };
     // Collected before looking for errors: the first of them is then the same in every run.
     let features: Vec<Result<_>> = needed.par_iter().map(one).collect();
-    context.observer.end();
+    context.sources.observer().end();
     features.into_iter().collect()
 }
 

@@ -4,9 +4,9 @@ use clap::ValueEnum;
 use sue::{
     EstimatorChoice,
     calibrate::{PrecisionGoal, Scope, calibrate_false_acceptance, calibrate_precision},
-    evaluate::Judged,
 };
-use vpr_core::cli::{self, Outcome};
+use vpr_core::Judged;
+use vpr_report::cli::{self, Outcome};
 
 use super::{input::InputArgs, truth::TruthArgs};
 

@@ -5,12 +5,9 @@ use std::{fmt::Write as _, path::PathBuf};
 use anyhow::{bail, ensure};
 use clap::ValueEnum;
 use sue::{EstimatorChoice, Threshold, UncertaintyEstimator as _, Variance, Variances};
-use vpr_core::{
-    Retrieval,
-    cli::{self, Outcome},
-    map::replace,
-    npy,
-};
+use vpr_core::Retrieval;
+use vpr_files::{npy, replace};
+use vpr_report::cli::{self, Outcome};
 
 use super::input::{Input, InputArgs, name_of};
 

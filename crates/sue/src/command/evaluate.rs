@@ -1,14 +1,13 @@
 //! `sue evaluate`: how well estimators tell correct from wrong matches.
 
-use sue::{
-    EstimatorChoice,
-    evaluate::{Evaluation, Judged},
-};
+use sue::EstimatorChoice;
 use vpr_core::{
-    Definition,
-    cli::{self, Outcome},
+    Definition, Evaluation, Judged, Provenance,
     metrics::bootstrap::{Interval, Resampling},
-    table::{Cell, Format, Provenance, Table},
+};
+use vpr_report::{
+    cli::{self, Outcome},
+    table::{Cell, Format, Table},
 };
 
 use super::{input::InputArgs, truth::TruthArgs};
@@ -57,7 +56,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
             None => first = Some(evaluation),
             Some(first) => {
                 let difference = evaluation.auc_pr_difference(first, &resampling);
-                push(&mut table, prepared.name(), "AUC-PR minus first", difference, &judged)?;
+                push(&mut table, prepared.name(), "AUC-PR minus first", Ok(difference?), &judged)?;
             }
         }
     }
@@ -75,7 +74,7 @@ fn push_summary(
     for definition in [Definition::Published, Definition::Corrected] {
         let column = format!("AUC-PR, {definition}");
         let interval = evaluation.auc_pr_interval(definition, resampling);
-        push(table, row, &column, interval, judged)?;
+        push(table, row, &column, Ok(interval?), judged)?;
     }
     let summary = evaluation.summary()?;
     let values = [

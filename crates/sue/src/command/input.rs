@@ -7,11 +7,9 @@ use sue::{DistanceKind, EstimatorSettings, Sue, SueParams};
 use vpr_core::{
     Descriptors, Error, Poses, Retrieval,
     knn::{self, Metric, RowSource, SearchParams},
-    map::{
-        About, Access, Names, OpenMap, Opening,
-        door::{self, Format, Parts},
-    },
+    map::{About, Access, Names, OpenMap, Opening},
 };
+use vpr_data::exchange::{self, Format, Parts};
 
 /// Map and queries, and what the estimators are told.
 #[derive(clap::Args)]
@@ -108,7 +106,7 @@ impl Side {
             let (names, poses, about) = (map.names()?, map.poses()?, map.about().clone());
             return Ok(Self { rows: Rows::Open(map), names, poses, about });
         }
-        let Parts { names, descriptors, poses, about } = door::read(format, path)?;
+        let Parts { names, descriptors, poses, about } = exchange::read(format, path)?;
         let none = || Error::Empty("descriptors").in_file(path);
         let rows = Rows::Memory(descriptors.ok_or_else(none)?);
         Ok(Self { rows, names, poses, about })
@@ -227,7 +225,7 @@ pub(crate) fn poses_of(
     names: Option<&Names>,
     n: usize,
 ) -> anyhow::Result<(Poses, Option<vpr_core::map::Coordinates>)> {
-    let read = door::read(Format::guess(path)?, path)?;
+    let read = exchange::read(Format::guess(path)?, path)?;
     let coordinates = read.about.coordinates;
     let parts = Parts { names: names.cloned(), ..Parts::default() };
     let joined = parts.join(read).map_err(|err| err.in_file(path))?;

@@ -13,15 +13,13 @@ use default_encoder::{
     cities::{self, VISITS},
 };
 use sue::net::{self, Learned, Lesson, Training};
-use vpr_core::{
-    Error,
-    cli::{self, Outcome},
-};
+use vpr_core::Error;
 use vpr_nets::{
     loss::{LogVariance, SelfTeaching},
     model::default::{DefaultEncoderConfig, INPUT},
     train::{Checkpoint, Report},
 };
+use vpr_report::cli::{self, Outcome};
 
 /// First line of a log.
 const HEAD: &str = "step,loss,rate\n";

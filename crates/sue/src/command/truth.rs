@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
-use vpr_core::{GroundTruth, cli, dataset::layout::vpr_bench::GroundTruthFile};
+use vpr_core::GroundTruth;
+use vpr_data::layout::vpr_bench::GroundTruthFile;
+use vpr_report::cli;
 
 use super::input::{Input, poses_of};
 

@@ -1,50 +1,33 @@
 //! Datasets as an encoder sees them: what was retrieved for every query, where, and whether rightly.
 
 mod counterparts;
-mod encoded;
-mod inliers;
-mod keys;
-mod published;
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-    sync::{Mutex, PoisonError},
-};
+use std::{path::PathBuf, sync::Arc};
 
 pub use counterparts::{COUNTERPARTS, Counterpart};
-pub use inliers::{LocalMethod, Verified, Verifier, inlier_counts};
 use ndarray::Array2;
-use vpr_core::{
-    GroundTruth, Observer, PlanarPosition, Poses, Retrieval, Similarities,
-    dataset::{DataRoots, Dataset, DatasetEntry, Manifest},
-    table::Provenance,
+use vpr_core::{GroundTruth, Judged, PlanarPosition, Poses, Provenance, Retrieval, retrieve};
+use vpr_data::Dataset;
+use vpr_nets::encode::Encoder;
+use vpr_study::{
+    Direction, Memo, Network, Runner, Sources, Technique,
+    technique::Found,
+    verification::{LocalMethod, Matches, Verified},
 };
 
 use crate::{
-    EstimatorChoice, EstimatorSettings, Result, UncertaintyEstimator, Variances, evaluate::Judged,
-    net::Learned,
+    EstimatorChoice, EstimatorSettings, Result, UncertaintyEstimator, Variances,
+    net::{Learned, LearnedEncoder},
 };
 
 /// References ranked per query: enough for every estimator and sweep.
 pub const RANKS: usize = 50;
 
-/// Where data, weights and caches lie.
-#[derive(Clone, Copy)]
-pub struct Sources<'a> {
-    /// Folders of datasets and weights, the first that has one wins.
-    pub roots: &'a DataRoots,
-    /// Folder that keeps rendered places, descriptors and inlier counts.
-    pub cache: &'a Path,
-    /// Told about progress.
-    pub observer: &'a dyn Observer,
-    /// What was opened before.
-    pub known: &'a Known,
+/// Datasets as encoders see them, opened once: experiments of one process share them.
+pub struct Corpora<'a> {
+    sources: Sources<'a>,
+    opened: Memo<(String, String), Arc<Collection>>,
 }
-
-/// Datasets opened so far: experiments of one process share them.
-#[derive(Debug, Default)]
-pub struct Known(Mutex<BTreeMap<(String, Vec<String>), Opened>>);
 
 /// One dataset, described by one encoder.
 #[derive(Clone, Debug)]
@@ -105,13 +88,27 @@ impl Corpus {
         let variances = self.variances.as_ref().ok_or(vpr_core::Error::Empty("variances"))?;
         learned.estimator().estimate(&Variances::new(variances.view())?)
     }
+
+    /// Inliers of every query with its best reference, from the store if they were counted before.
+    ///
+    /// # Errors
+    ///
+    /// An image that cannot be read, by its path.
+    pub fn inlier_counts(&self, method: LocalMethod, sources: &Sources<'_>) -> Result<Verified> {
+        let Some((queries, references)) = &self.images else {
+            return Ok(Verified::NotAtHand("there are no images to verify".to_owned()));
+        };
+        let best = self.retrieval.best();
+        let matches = Matches { queries, references, best: &best };
+        Ok(sources.inlier_counts(&self.label(), matches, method)?)
+    }
 }
 
-/// All corpora of one dataset: one per encoder, or the error that an encoder is not at hand.
-#[derive(Clone, Debug)]
-pub struct Opened {
+/// The corpora of one dataset, and why others could not be made.
+#[derive(Clone, Debug, Default)]
+pub struct Collection {
     /// Those that could be made.
-    pub corpora: Vec<Corpus>,
+    pub corpora: Vec<Arc<Corpus>>,
     /// Why others could not, one line each.
     pub missing: Vec<String>,
 }
@@ -119,67 +116,141 @@ pub struct Opened {
 /// The encoder that stands for matches stored by the authors.
 pub const PUBLISHED: &str = "published";
 
-/// Opens a dataset as each of these encoders sees it.
-///
-/// `id` is one of the manifest's, `world/…`, or the name of a [`Counterpart`]. Encoders are `hog`,
-/// `cohog`, `btl`, `stun`, [`PUBLISHED`] for stored score matrices, or a name that
-/// `vpr_nets::encode` knows.
-///
-/// # Errors
-///
-/// Data that is there but malformed; data or weights that are not there are in
-/// [`Opened::missing`].
-pub fn open(id: &str, encoders: &[String], sources: &Sources<'_>) -> Result<Opened> {
-    let key = (id.to_owned(), encoders.to_vec());
-    // Entries are inserted whole, so a thread that panicked left nothing half done.
-    let known = || sources.known.0.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(opened) = known().get(&key) {
-        return Ok(opened.clone());
+impl<'a> Corpora<'a> {
+    /// Nothing is opened yet.
+    #[must_use]
+    pub fn new(sources: Sources<'a>) -> Self {
+        Self { sources, opened: Memo::default() }
     }
-    let opened = open_anew(id, encoders, sources)?;
-    known().insert(key, opened.clone());
-    Ok(opened)
-}
 
-fn open_anew(id: &str, encoders: &[String], sources: &Sources<'_>) -> Result<Opened> {
-    let counterpart = COUNTERPARTS.iter().find(|it| it.name == id);
-    let real_id = counterpart.map_or(id, |it| it.world);
-    let mut opened = Opened { corpora: Vec::new(), missing: Vec::new() };
-    if encoders.iter().any(|it| it == PUBLISHED) {
-        let entry = Manifest::builtin();
-        let entry = entry.find(real_id)?;
-        opened.corpora.extend(published::open(entry, sources)?);
-        if opened.corpora.is_empty() {
-            opened.missing.push(absent(entry, "stored matches"));
-        }
+    /// Where data, weights and caches lie.
+    #[must_use]
+    pub fn sources(&self) -> &Sources<'a> {
+        &self.sources
     }
-    let encoders: Vec<&String> = encoders.iter().filter(|it| *it != PUBLISHED).collect();
-    if encoders.is_empty() {
-        return Ok(opened);
-    }
-    let dataset = vpr_worlds::open_named(real_id, sources.roots, sources.cache, sources.observer)?;
-    let Some(mut dataset) = dataset else {
-        let manifest = Manifest::builtin();
-        opened.missing.push(absent(manifest.find(real_id)?, "images"));
-        return Ok(opened);
-    };
-    if let Some(counterpart) = counterpart {
-        counterpart.name.clone_into(&mut dataset.name);
-    }
-    for encoder in encoders {
-        match encoded::describe(encoder, &dataset, sources)? {
-            encoded::Described::As { encoder, retrieval, variances } => {
-                let corpus = corpus_of(&dataset, encoder, retrieval)?;
-                opened.corpora.push(Corpus { variances, ..corpus });
+
+    /// Opens a dataset as each of these encoders sees it.
+    ///
+    /// `id` is one of the manifest's, `world/…`, or the name of a [`Counterpart`]. Encoders are
+    /// [`PUBLISHED`] for stored score matrices, `btl`, `stun`, or the name of a technique, see
+    /// [`vpr_study::technique`].
+    ///
+    /// # Errors
+    ///
+    /// Data that is there but malformed; data or weights that are not there are in
+    /// [`Collection::missing`].
+    pub fn open(&self, id: &str, encoders: &[String]) -> Result<Collection> {
+        let mut all = Collection::default();
+        // Stored matches come first, wherever they are listed.
+        let (stored, others): (Vec<&String>, _) = encoders.iter().partition(|it| *it == PUBLISHED);
+        for encoder in stored.into_iter().chain(others) {
+            let key = (id.to_owned(), encoder.clone());
+            let one = self.opened.get_or(key, || self.open_one(id, encoder).map(Arc::new))?;
+            all.corpora.extend(one.corpora.iter().cloned());
+            for why in &one.missing {
+                // A dataset that is not at hand is missing once, however many encoders ask for it.
+                if !all.missing.contains(why) {
+                    all.missing.push(why.clone());
+                }
             }
-            encoded::Described::NotAtHand(why) => opened.missing.push(why),
         }
+        Ok(all)
     }
-    Ok(opened)
+
+    fn open_one(&self, id: &str, encoder: &str) -> Result<Collection> {
+        let counterpart = COUNTERPARTS.iter().find(|it| it.name == id);
+        let real_id = counterpart.map_or(id, |it| it.world);
+        if encoder == PUBLISHED {
+            return self.published(real_id);
+        }
+        let Some(dataset) = self.sources.images(real_id)? else {
+            return Ok(missing(self.sources.why_absent(real_id, "images")?));
+        };
+        let name = counterpart.map_or(dataset.name.as_str(), |it| it.name);
+        let corpus = match Learned::named(encoder) {
+            Some(learned) => self.with_variances(learned, &dataset)?,
+            None => self.described(encoder, &dataset)?,
+        };
+        Ok(match corpus {
+            Ok(corpus) => {
+                let corpus = Corpus { name: name.to_owned(), ..corpus };
+                Collection { corpora: vec![Arc::new(corpus)], missing: Vec::new() }
+            }
+            Err(why) => missing(why),
+        })
+    }
+
+    /// One corpus per technique with stored matches; scores are cosines, so distances are those of
+    /// unit descriptors.
+    fn published(&self, id: &str) -> Result<Collection> {
+        let mut corpora = Vec::new();
+        for technique in Technique::ALL {
+            let Some(stored) = self.sources.stored(id, technique)? else { continue };
+            let retrieval = stored.scores.retrieval(RANKS)?;
+            corpora.push(Arc::new(Corpus {
+                name: self.sources.entry(id)?.name,
+                encoder: format!("{}, stored scores", technique.name()),
+                provenance: stored.provenance,
+                judged: Judged::new(&retrieval.best(), &stored.truth)?,
+                retrieval,
+                poses: frames(stored.truth.n_references()),
+                query_poses: None,
+                truth: (*stored.truth).clone(),
+                images: None,
+                variances: None,
+                note: Some("frame indices stand for positions".to_owned()),
+            }));
+        }
+        if corpora.is_empty() {
+            return Ok(missing(self.sources.why_absent(id, "stored matches")?));
+        }
+        Ok(Collection { corpora, missing: Vec::new() })
+    }
+
+    /// A technique of the registry; `Err` inside is why it is not at hand.
+    fn described(&self, encoder: &str, dataset: &Dataset) -> Result<Result<Corpus, String>> {
+        let runner = match self.sources.find(encoder)? {
+            Found::Runs(runner) => runner,
+            Found::Absent(why) => return Ok(Err(why)),
+        };
+        let scores = self.sources.scores(&runner, dataset, Direction::AsReleased)?;
+        corpus_of(dataset, runner.encoder, scores.retrieval(RANKS)?).map(Ok)
+    }
+
+    /// A network that predicts variances with its descriptors.
+    fn with_variances(
+        &self,
+        learned: Learned,
+        dataset: &Dataset,
+    ) -> Result<Result<Corpus, String>> {
+        let (name, file) = (learned.name(), learned.weights());
+        let Some(path) = self.sources.locate(&file)? else {
+            let (key, file) = (learned.key(), file.display());
+            return Ok(Err(format!(
+                "{name}: its weights, {file}, are not at hand; `sue train {key}` makes them"
+            )));
+        };
+        let encoder = Arc::new(LearnedEncoder::open(learned, &path)?);
+        let runner = Runner {
+            name: learned.key().to_owned(),
+            column: name,
+            encoder: name.to_owned(),
+            technique: Arc::new(Network::new(Arc::clone(&encoder) as Arc<dyn Encoder>)),
+        };
+        let of = |images: &[PathBuf]| {
+            let what = format!("{name} on {}", dataset.name);
+            let rows = self.sources.features(&runner, images, &what)?.into_descriptors();
+            encoder.split(&rows.ok_or(vpr_core::Error::Empty("descriptors of a network"))?)
+        };
+        let (queries, references) = (of(&dataset.queries)?, of(&dataset.references)?);
+        let retrieval = retrieve(&queries.descriptors, &references.descriptors, RANKS)?;
+        let corpus = corpus_of(dataset, name.to_owned(), retrieval)?;
+        Ok(Ok(Corpus { variances: Some(queries.variances), ..corpus }))
+    }
 }
 
-fn absent(entry: &DatasetEntry, what: &str) -> String {
-    format!("{}: no {what} at hand; origin: {}", entry.name, entry.origin)
+fn missing(why: String) -> Collection {
+    Collection { corpora: Vec::new(), missing: vec![why] }
 }
 
 fn corpus_of(dataset: &Dataset, encoder: String, retrieval: Retrieval) -> Result<Corpus> {
@@ -206,22 +277,4 @@ fn corpus_of(dataset: &Dataset, encoder: String, retrieval: Retrieval) -> Result
 /// Frame indices as positions on a line.
 fn frames(n: usize) -> Poses {
     Poses::Planar((0..n).map(|frame| PlanarPosition::new(frame as f64, 0.0)).collect())
-}
-
-/// Distances of unit descriptors with these cosines, `√(2 − 2 s)`, and the references in their
-/// order.
-fn retrieval_of(similarities: &Similarities) -> Result<Retrieval> {
-    let ranking = similarities.ranked(RANKS)?;
-    let shape = (ranking.len(), ranking.k());
-    let indices = Array2::from_shape_fn(shape, |(query, rank)| ranking.indices(query)[rank]);
-    let distances = Array2::from_shape_fn(shape, |(query, rank)| {
-        let similarity = similarities.view()[(query, indices[(query, rank)])];
-        distance(similarity)
-    });
-    Ok(Retrieval::new(indices, distances)?)
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "distances are f32")]
-fn distance(cosine: f64) -> f32 {
-    (2.0 - 2.0 * cosine).max(0.0).sqrt() as f32
 }

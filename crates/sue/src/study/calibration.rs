@@ -3,14 +3,12 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use vpr_core::{
-    metrics::bootstrap::{Z_95, pick, wilson_interval},
-    table::Table,
-};
+use vpr_core::metrics::bootstrap::{Z_95, pick, wilson_interval};
+use vpr_report::table::Table;
 
 use super::{
     Context,
-    subject::{Opened, Subject, open},
+    subject::{Labelled, Subject, open},
 };
 use crate::{
     EstimatorChoice, Result,
@@ -69,7 +67,7 @@ pub(super) fn run(
 
 /// Calibrates on one random half and looks at the other.
 fn one(
-    opened: &Opened,
+    opened: &Labelled,
     uncertainty: &[f64],
     goal: PrecisionGoal,
     (seed, split): (u64, usize),
@@ -100,13 +98,18 @@ fn one(
     })
 }
 
-fn push(table: &mut Table, opened: &Opened, row: &str, outcomes: &[Outcome]) -> Result<()> {
+fn push(table: &mut Table, opened: &Labelled, row: &str, outcomes: &[Outcome]) -> Result<()> {
     let share = |is: fn(&Outcome) -> bool| outcomes.iter().filter(|it| is(it)).count();
     let n = outcomes.len();
     let mut count = |column: &str, hits: usize| -> Result<()> {
         let interval = wilson_interval(hits, n, Z_95)?;
-        let cell =
-            vpr_core::table::Cell::new(row, column, interval.estimate, opened.corpus.provenance, n);
+        let cell = vpr_report::table::Cell::new(
+            row,
+            column,
+            interval.estimate,
+            opened.corpus.provenance,
+            n,
+        );
         table.push(cell.within(interval.low, interval.high, "Wilson, over splits"));
         Ok(())
     };
@@ -115,7 +118,7 @@ fn push(table: &mut Table, opened: &Opened, row: &str, outcomes: &[Outcome]) -> 
     count("broken on all queries", share(|it| it.all_below))?;
     let coverage = outcomes.iter().map(|it| it.coverage).sum::<f64>() / n as f64;
     let cell =
-        vpr_core::table::Cell::new(row, "mean coverage", coverage, opened.corpus.provenance, n);
+        vpr_report::table::Cell::new(row, "mean coverage", coverage, opened.corpus.provenance, n);
     table.push(cell);
     table.push(opened.cell(row, "base rate", opened.corpus.judged.base_rate()));
     Ok(())

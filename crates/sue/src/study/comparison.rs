@@ -2,21 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use vpr_core::{
-    Definition, Error as CoreError,
-    table::{Cell, Provenance, Table, Value},
-};
+use vpr_core::{Definition, Error, Evaluation, Provenance};
+use vpr_report::table::{Cell, Table, Value};
+
+use vpr_study::verification::LocalMethod;
 
 use super::{
     Context,
-    subject::{EFFICIENT, Opened, Scored, Subject, open},
+    subject::{EFFICIENT, Labelled, Scored, Subject, open},
     timing,
 };
-use crate::{
-    Error, Result,
-    corpus::{COUNTERPARTS, LocalMethod},
-    evaluate::Evaluation,
-};
+use crate::{Result, corpus::COUNTERPARTS};
 
 /// Column of the share of correct best matches.
 const BASE_RATE: &str = "base rate";
@@ -52,7 +48,7 @@ pub(super) fn run(table: &mut Table, subjects: &[Subject], context: Context<'_>)
 
 /// Whether the difference of AUC-PR to SUE has an interval with 0 in it.
 fn is_within_chance(
-    opened: &Opened,
+    opened: &Labelled,
     scored: &[Scored],
     it: &Scored,
     context: Context<'_>,
@@ -70,8 +66,8 @@ fn is_within_chance(
     let (first, second) = (Evaluation::new(first, judged)?, Evaluation::new(second, judged)?);
     match second.auc_pr_difference(&first, &context.resampling()) {
         Ok(interval) => Ok(interval.low <= 0.0 && interval.high >= 0.0),
-        Err(Error::Core(CoreError::Undefined { .. })) => Ok(false),
-        Err(err) => Err(err),
+        Err(Error::Undefined { .. }) => Ok(false),
+        Err(err) => Err(err.into()),
     }
 }
 
@@ -104,7 +100,7 @@ fn average(table: &mut Table) {
 /// One row of times, all from the first corpus with images.
 fn times(
     table: &mut Table,
-    all: &[(Opened, Vec<LocalMethod>)],
+    all: &[(Labelled, Vec<LocalMethod>)],
     context: Context<'_>,
 ) -> Result<()> {
     let Some((opened, verify)) =
@@ -127,7 +123,7 @@ fn times(
         }
     }
     for &method in verify {
-        if let Ok(verifier) = method.open(context.sources.roots)?
+        if let Ok(verifier) = method.open(context.corpora.sources().roots())?
             && let Some(value) = timing::verification(opened, &verifier)?
         {
             push(method.name(), value);

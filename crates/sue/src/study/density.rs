@@ -1,10 +1,10 @@
 //! SUE compensated for the density of the map: table 5.5.
 
-use vpr_core::table::{Cell, Table};
+use vpr_report::table::{Cell, Table};
 
 use super::{
     Context,
-    subject::{Opened, Scored, Subject, open},
+    subject::{Labelled, Scored, Subject, open},
 };
 use crate::{
     Density, DensityCompensatedSue, Error, EstimatorChoice, Places, Result, Sue,
@@ -26,7 +26,7 @@ pub(super) fn run(
 /// One row: without compensation, and with each neighbour; distinct positions, then plain.
 pub(super) fn push_all(
     table: &mut Table,
-    opened: &Opened,
+    opened: &Labelled,
     row: &str,
     nth: &[usize],
     context: Context<'_>,
@@ -53,7 +53,7 @@ pub(super) fn push_all(
     Ok(())
 }
 
-fn compensated(opened: &Opened, nth: usize, density: Density) -> Result<Vec<f64>> {
+fn compensated(opened: &Labelled, nth: usize, density: Density) -> Result<Vec<f64>> {
     let corpus = &opened.corpus;
     let sue = DensityCompensatedSue::new(Sue::corrected(), &corpus.poses, nth, density)?;
     sue.estimate(&Places::from_poses(&corpus.retrieval, &corpus.poses)?)

@@ -1,11 +1,11 @@
 //! Accuracy of a linear SVM on one or two uncertainties: table 5.3.
 
 use serde::Deserialize;
-use vpr_core::table::{Cell, Table};
+use vpr_report::table::{Cell, Table};
 
 use super::{
     Context,
-    subject::{Opened, Subject, open, open_one},
+    subject::{Labelled, Subject, open, open_one},
 };
 use crate::{
     Error, EstimatorChoice, Result,
@@ -70,13 +70,13 @@ fn params(context: Context<'_>) -> SvmParams {
     SvmParams { tolerance: None, seed: context.seed, ..SvmParams::default() }
 }
 
-fn push_constant(table: &mut Table, opened: &Opened) {
+fn push_constant(table: &mut Table, opened: &Labelled) {
     let base = opened.corpus.judged.base_rate();
     table.push(opened.cell(CONSTANT, &opened.row, 100.0 * base.max(1.0 - base)));
 }
 
 /// Every estimator alone, verification alone, and both.
-fn features(opened: &Opened, subject: &Subject, context: Context<'_>) -> Result<Features> {
+fn features(opened: &Labelled, subject: &Subject, context: Context<'_>) -> Result<Features> {
     let mut all = Vec::new();
     let mut verified = Vec::new();
     for &method in &subject.verify {

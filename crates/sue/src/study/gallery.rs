@@ -1,17 +1,17 @@
 //! Images in coloured frames: figures 5.3, 5.4, 5.6 and 5.13.
 
-mod sheet;
-
-use image::RgbImage;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
-use vpr_core::table::{Cell, Table};
+use vpr_report::{
+    page::Sheet,
+    table::{Cell, Table},
+};
+use vpr_study::{ContactSheet, Frame};
 
-use self::sheet::{Frame, Sheet};
 use super::{
     Context, first_method,
-    subject::{Opened, Scored, Subject, open_one},
+    subject::{Labelled, Scored, Subject, open_one},
 };
 use crate::{EstimatorChoice, Result};
 
@@ -44,7 +44,7 @@ pub(super) fn run(
     subject: &Subject,
     scene: Scene,
     context: Context<'_>,
-) -> Result<Option<RgbImage>> {
+) -> Result<Option<Sheet>> {
     let Some(opened) = open_one(table, subject, "uncertainty", context)? else { return Ok(None) };
     let mut scored = opened.score(&METHODS)?;
     if let Some(method) = first_method(subject) {
@@ -54,7 +54,7 @@ pub(super) fn run(
         .into_iter()
         .filter_map(|Scored { name, uncertainty, .. }| Some((name, uncertainty.ok()?)))
         .collect();
-    let mut sheet = Sheet::default();
+    let mut sheet = ContactSheet::default();
     match scene {
         Scene::Extremes => extremes(table, &opened, &scored, &mut sheet),
         Scene::Disagreements => disagreements(table, &opened, &scored, &mut sheet),
@@ -66,7 +66,7 @@ pub(super) fn run(
     if opened.is_real() {
         return Ok(None);
     }
-    sheet.draw(queries, references).map(Some)
+    Ok(Some(sheet.draw(queries, references)?))
 }
 
 /// Queries from the least to the most uncertain, ties by lower index.
@@ -86,7 +86,7 @@ fn ranks(uncertainty: &[f64]) -> Vec<f64> {
 }
 
 /// The query over its `n` best references.
-fn column(opened: &Opened, query: usize, n: usize) -> Vec<Frame> {
+fn column(opened: &Labelled, query: usize, n: usize) -> Vec<Frame> {
     let references = opened.corpus.retrieval.indices(query);
     let correct = |reference: usize| opened.corpus.truth.is_correct(query, reference);
     let framed = references.iter().take(n).map(|&it| Frame::Reference(it, correct(it)));
@@ -94,7 +94,13 @@ fn column(opened: &Opened, query: usize, n: usize) -> Vec<Frame> {
 }
 
 /// One tile in numbers: which query, how uncertain, whether its match is correct.
-fn push(table: &mut Table, opened: &Opened, row: &str, column: &str, (query, value): (usize, f64)) {
+fn push(
+    table: &mut Table,
+    opened: &Labelled,
+    row: &str,
+    column: &str,
+    (query, value): (usize, f64),
+) {
     let correct = if opened.corpus.judged.correct()[query] { "correct" } else { "wrong" };
     let note = format!("query {query}, {correct}");
     let cell = opened.cell(row, column, value).noted(note);
@@ -103,9 +109,9 @@ fn push(table: &mut Table, opened: &Opened, row: &str, column: &str, (query, val
 
 fn extremes(
     table: &mut Table,
-    opened: &Opened,
+    opened: &Labelled,
     scored: &[(&'static str, Vec<f64>)],
-    sheet: &mut Sheet,
+    sheet: &mut ContactSheet,
 ) {
     for (name, uncertainty) in scored {
         let order = order(uncertainty);
@@ -130,9 +136,9 @@ fn extremes(
 
 fn disagreements(
     table: &mut Table,
-    opened: &Opened,
+    opened: &Labelled,
     scored: &[(&'static str, Vec<f64>)],
-    sheet: &mut Sheet,
+    sheet: &mut ContactSheet,
 ) {
     let rank_of = |name: &str| scored.iter().find(|it| it.0 == name).map(|it| ranks(&it.1));
     let (Some(sue), Some(distance)) = (rank_of("SUE"), rank_of("L2-distance")) else { return };
@@ -158,9 +164,9 @@ fn disagreements(
 
 fn complements(
     table: &mut Table,
-    opened: &Opened,
+    opened: &Labelled,
     scored: &[(&'static str, Vec<f64>)],
-    sheet: &mut Sheet,
+    sheet: &mut ContactSheet,
 ) {
     let sue = scored.iter().find(|it| it.0 == "SUE").map(|it| ranks(&it.1));
     let verified = scored.iter().find(|it| it.0.contains("RANSAC")).map(|it| ranks(&it.1));
@@ -181,9 +187,9 @@ fn complements(
 
 fn ranked(
     table: &mut Table,
-    opened: &Opened,
+    opened: &Labelled,
     scored: &[(&'static str, Vec<f64>)],
-    sheet: &mut Sheet,
+    sheet: &mut ContactSheet,
     seed: u64,
 ) {
     let n = opened.corpus.judged.len();

@@ -1,12 +1,13 @@
 //! All metrics of all estimators.
 
-use vpr_core::table::{Cell, Table};
+use vpr_report::table::{Cell, Table};
 
 use super::{
     Context,
     subject::{Subject, open},
 };
-use crate::{Result, evaluate::Evaluation};
+use crate::Result;
+use vpr_core::Evaluation;
 
 pub(super) fn run(table: &mut Table, subjects: &[Subject], context: Context<'_>) -> Result<()> {
     for (opened, verify) in open(table, subjects, "AUC-ROC", context)? {

@@ -17,21 +17,16 @@ mod sweep;
 mod timing;
 mod weighing;
 
-use image::RgbImage;
 use serde::Deserialize;
-use vpr_core::{
-    experiment::Experiment, figure::Figure, metrics::bootstrap::Resampling, table::Table,
-};
+use vpr_core::metrics::bootstrap::Resampling;
+use vpr_report::{experiment::Experiment, page::Report};
+use vpr_study::{Dial, verification::LocalMethod};
 
 pub use fusion::Group;
 pub use gallery::Scene;
 pub use subject::Subject;
 
-use crate::{
-    EstimatorChoice, Result,
-    corpus::{LocalMethod, Sources},
-    net::Learned,
-};
+use crate::{EstimatorChoice, Result, corpus::Corpora, net::Learned};
 
 /// What to compute; the key `kind` of `[study]` chooses.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -118,14 +113,8 @@ pub enum Study {
     },
     /// Whether predicted variances rise with a nuisance of generated places.
     Noise {
-        /// The world, with the settings that stay.
-        world: String,
-        /// What the page calls the nuisance, unit included.
-        name: String,
-        /// The recipe's key.
-        key: String,
-        /// Its values, from least to most of the nuisance.
-        values: Vec<f64>,
+        /// The nuisance, from least to most.
+        dial: Dial,
         /// The learned uncertainties.
         learned: Vec<Learned>,
     },
@@ -142,22 +131,11 @@ pub enum Study {
     },
 }
 
-/// What a study made: numbers, and a drawing of them if it is a figure.
-#[derive(Clone, Debug)]
-pub struct Report {
-    /// The numbers.
-    pub table: Table,
-    /// The drawing.
-    pub figure: Option<Figure>,
-    /// The contact sheet.
-    pub picture: Option<RgbImage>,
-}
-
 /// What every study is given.
 #[derive(Clone, Copy)]
 pub struct Context<'a> {
-    /// Where data, weights and caches lie.
-    pub sources: Sources<'a>,
+    /// Datasets as encoders see them.
+    pub corpora: &'a Corpora<'a>,
     /// Whether to measure what differs from run to run.
     pub timings: bool,
     /// Seed of every random draw.
@@ -178,7 +156,7 @@ impl Context<'_> {
 /// Wrong files name themselves; missing ones make absent cells.
 pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Report> {
     let mut table = experiment.table();
-    let (mut figure, mut picture) = (None, None);
+    let (mut figure, mut sheet) = (None, None);
     let out = &mut table;
     match &experiment.study {
         Study::Needs {} => needs::run(out),
@@ -195,7 +173,7 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
             figure = Some(pr_curves::run(out, subjects, estimators, context)?);
         }
         Study::Gallery { subject, scene } => {
-            picture = gallery::run(out, subject, *scene, context)?;
+            sheet = gallery::run(out, subject, *scene, context)?;
         }
         Study::Scatter { train, subjects, estimators, against } => {
             let axes = scatter::Axes { estimators, against: *against };
@@ -205,8 +183,7 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
             figure = Some(sweep::run(out, subjects, k, lambda, context)?);
         }
         Study::Spacing { subjects } => figure = Some(spacing::run(out, subjects, context)?),
-        Study::Noise { world, name, key, values, learned } => {
-            let dial = noise::Dial { world, name, key, values };
+        Study::Noise { dial, learned } => {
             figure = Some(noise::run(out, dial, learned, context)?);
         }
         Study::Calibration { subjects, splits, precision, risk } => {
@@ -215,7 +192,7 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         }
     }
     experiment.fill_thesis(&mut table);
-    Ok(Report { table, figure, picture })
+    Ok(Report { table, figure, sheet })
 }
 
 /// The local method of every subject's first choice, for studies that use one.

@@ -1,6 +1,7 @@
 //! What each family needs: table 5.1, read off the types of evidence.
 
-use vpr_core::table::{Cell, Provenance, Table};
+use vpr_core::Provenance;
+use vpr_report::table::{Cell, Table};
 
 use crate::{Evidence, Inliers, L2Distance, Share, Sue, UncertaintyEstimator, Variance};
 

@@ -1,17 +1,17 @@
 //! Precision–recall curves: figures 5.1, 5.8 and 5.10.
 
-use vpr_core::{
-    Definition, Error as CoreError,
+use vpr_core::{Definition, Error as CoreError, metrics};
+use vpr_report::{
     figure::{Curve, Figure, Panel},
-    metrics,
     table::Table,
 };
 
 use super::{
     Context,
-    subject::{Opened, Scored, Subject, open},
+    subject::{Labelled, Scored, Subject, open},
 };
-use crate::{EstimatorChoice, Result, evaluate::Evaluation};
+use crate::{EstimatorChoice, Result};
+use vpr_core::Evaluation;
 
 /// Recalls at which the curves are sampled.
 const RECALLS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
@@ -48,7 +48,7 @@ pub(super) fn run(
 }
 
 /// `(recall, precision)` of the published definition, recall ascending.
-fn curve(opened: &Opened, scored: &Scored) -> Result<Option<Vec<(f64, f64)>>> {
+fn curve(opened: &Labelled, scored: &Scored) -> Result<Option<Vec<(f64, f64)>>> {
     let Ok(uncertainty) = &scored.uncertainty else { return Ok(None) };
     let judged = &opened.corpus.judged;
     let evaluation = Evaluation::new(uncertainty, judged)?;
@@ -61,7 +61,7 @@ fn curve(opened: &Opened, scored: &Scored) -> Result<Option<Vec<(f64, f64)>>> {
 }
 
 /// Precision where recall first reaches each of [`RECALLS`].
-fn sample(table: &mut Table, opened: &Opened, row: &str, points: &[(f64, f64)]) {
+fn sample(table: &mut Table, opened: &Labelled, row: &str, points: &[(f64, f64)]) {
     for recall in RECALLS {
         if let Some((_, precision)) = points.iter().find(|point| point.0 >= recall - 1e-12) {
             let cell = opened.cell(row, &format!("P at R={recall}"), *precision);

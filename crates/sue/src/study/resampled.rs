@@ -1,14 +1,17 @@
 //! Queries resampled to a uniform density, a map that is not: table 5.6.
 
+use std::sync::Arc;
+
 use ndarray::Array2;
-use vpr_core::{GroundTruth, Poses, Retrieval, table::Table};
+use vpr_core::{GroundTruth, Judged, Poses, Retrieval};
+use vpr_report::table::Table;
 
 use super::{
     Context,
     density::push_all,
-    subject::{Opened, Subject, open_one},
+    subject::{Labelled, Subject, open_one},
 };
-use crate::{Result, corpus::Corpus, evaluate::Judged};
+use crate::{Result, corpus::Corpus};
 
 /// What is kept of map and queries.
 #[derive(Clone, Copy)]
@@ -36,11 +39,12 @@ pub(super) fn run(
         let row = format!("z {low}–{high} m");
         if queries.is_empty() {
             let why = format!("no query has its nearest neighbour {low} to {high} m away");
-            table.push(vpr_core::table::Cell::absent(&row, "none", why));
+            table.push(vpr_report::table::Cell::absent(&row, "none", why));
             continue;
         }
         let corpus = part_of(&opened.corpus, &queries, &references)?;
-        let part = Opened { row: row.clone(), corpus, learned: Vec::new() };
+        let corpus = Arc::new(corpus);
+        let part = Labelled { row: row.clone(), corpus, learned: Vec::new() };
         push_all(table, &part, &row, plan.nth, context)?;
     }
     Ok(())

@@ -1,13 +1,13 @@
 //! Two uncertainties of every query and the boundary of an SVM: figures 5.5, 5.11 and 5.12.
 
-use vpr_core::{
+use vpr_report::{
     figure::{Curve, Figure, Panel},
     table::{Cell, Table},
 };
 
 use super::{
     Context, first_method,
-    subject::{Opened, Subject, open, open_one},
+    subject::{Labelled, Subject, open, open_one},
 };
 use crate::{
     Error, EstimatorChoice, Result,
@@ -69,7 +69,7 @@ pub(super) fn run(
 
 /// First feature: horizontal; second: the estimator's.
 fn pairs(
-    opened: &Opened,
+    opened: &Labelled,
     subject: &Subject,
     estimator: EstimatorChoice,
     against: Option<EstimatorChoice>,
@@ -89,7 +89,12 @@ fn pairs(
 }
 
 /// How many matches lie where, in numbers.
-fn push(table: &mut Table, opened: &Opened, pairs: &Pairs, svm: Option<&LinearSvm>) -> Result<()> {
+fn push(
+    table: &mut Table,
+    opened: &Labelled,
+    pairs: &Pairs,
+    svm: Option<&LinearSvm>,
+) -> Result<()> {
     let row = format!("{}: {} and {}", opened.row, pairs.labels.0, pairs.labels.1);
     let judged = &opened.corpus.judged;
     let cell = opened.cell(&row, "accuracy of the boundary", 0.0);
@@ -118,7 +123,7 @@ fn scale(values: &[Vec<f64>], feature: usize) -> (f64, f64) {
     (low, if high > low { high - low } else { 1.0 })
 }
 
-fn panel(opened: &Opened, pairs: &Pairs, learnt: &Pairs, svm: Option<&LinearSvm>) -> Panel {
+fn panel(opened: &Labelled, pairs: &Pairs, learnt: &Pairs, svm: Option<&LinearSvm>) -> Panel {
     let (x_scale, y_scale) = (scale(&learnt.values, 0), scale(&learnt.values, 1));
     let x = |value: f64| (value - x_scale.0) / x_scale.1;
     let y = |value: f64| ((value - y_scale.0) / y_scale.1).max(0.0).mul_add(1.0, FLOOR).log10();

@@ -1,7 +1,7 @@
 //! Distances to the nearest neighbour in space: figure 5.9.
 
-use vpr_core::{
-    Poses,
+use vpr_core::Poses;
+use vpr_report::{
     figure::{Curve, Figure, Panel},
     table::{Cell, Table},
 };

@@ -1,17 +1,16 @@
 //! Datasets under encoders, and the uncertainties of their matches.
 
 use serde::Deserialize;
-use vpr_core::{
-    Definition,
-    metrics::bootstrap::Resampling,
-    table::{Cell, Provenance, Table},
-};
+use std::sync::Arc;
+
+use vpr_core::{Definition, Evaluation, Judged, Provenance, metrics::bootstrap::Resampling};
+use vpr_report::table::{Cell, Table};
+use vpr_study::verification::{LocalMethod, Verified};
 
 use super::Context;
 use crate::{
     Error, EstimatorChoice, EstimatorSettings, InlierCounts, Inliers, Result, UncertaintyEstimator,
-    corpus::{self, COUNTERPARTS, Corpus, LocalMethod, Verified, inlier_counts},
-    evaluate::{Evaluation, Judged},
+    corpus::{COUNTERPARTS, Corpus},
     net::Learned,
 };
 
@@ -32,12 +31,12 @@ pub struct Subject {
 }
 
 /// One corpus with its row label.
-pub(super) struct Opened {
+pub(super) struct Labelled {
     /// Row label.
     pub(super) row: String,
-    pub(super) corpus: Corpus,
+    pub(super) corpus: Arc<Corpus>,
     /// The same dataset under encoders that predict variances, or why there is none.
-    pub(super) learned: Vec<(Learned, Result<Corpus, String>)>,
+    pub(super) learned: Vec<(Learned, Result<Arc<Corpus>, String>)>,
 }
 
 /// The uncertainties of one method, or why it has none.
@@ -55,17 +54,17 @@ pub(super) fn open(
     subjects: &[Subject],
     column: &str,
     context: Context<'_>,
-) -> Result<Vec<(Opened, Vec<LocalMethod>)>> {
+) -> Result<Vec<(Labelled, Vec<LocalMethod>)>> {
     let mut all = Vec::new();
     for subject in subjects {
-        let opened = corpus::open(&subject.dataset, &subject.encoders, &context.sources)?;
+        let opened = context.corpora.open(&subject.dataset, &subject.encoders)?;
         let is_alone = subject.encoders.len() == 1;
         let mut learned = learned_of(subject, context)?;
         for corpus in opened.corpora {
             let is_counterpart = COUNTERPARTS.iter().any(|it| it.name == subject.dataset);
             let row = if is_counterpart && is_alone { corpus.name.clone() } else { corpus.label() };
             let learned = std::mem::take(&mut learned);
-            all.push((Opened { row, corpus, learned }, subject.verify.clone()));
+            all.push((Labelled { row, corpus, learned }, subject.verify.clone()));
         }
         for why in opened.missing {
             let cell = Cell::absent(&subject.dataset, column, why);
@@ -82,10 +81,10 @@ pub(super) fn open(
 fn learned_of(
     subject: &Subject,
     context: Context<'_>,
-) -> Result<Vec<(Learned, Result<Corpus, String>)>> {
+) -> Result<Vec<(Learned, Result<Arc<Corpus>, String>)>> {
     let open = |&learned: &Learned| {
         let name = [learned.key().to_owned()];
-        let mut opened = corpus::open(&subject.dataset, &name, &context.sources)?;
+        let mut opened = context.corpora.open(&subject.dataset, &name)?;
         let missing = || opened.missing.join("; ");
         Ok((learned, opened.corpora.pop().ok_or_else(missing)))
     };
@@ -98,7 +97,7 @@ pub(super) fn open_one(
     subject: &Subject,
     column: &str,
     context: Context<'_>,
-) -> Result<Option<Opened>> {
+) -> Result<Option<Labelled>> {
     let mut all = open(table, std::slice::from_ref(subject), column, context)?;
     all.truncate(1);
     Ok(all.pop().map(|it| it.0))
@@ -118,7 +117,7 @@ pub(super) const EFFICIENT: [EstimatorChoice; 8] = [
 
 impl Scored {
     /// The matches it is about.
-    pub(super) fn judged<'a>(&'a self, opened: &'a Opened) -> &'a Judged {
+    pub(super) fn judged<'a>(&'a self, opened: &'a Labelled) -> &'a Judged {
         self.own.as_ref().unwrap_or(&opened.corpus.judged)
     }
 
@@ -129,7 +128,7 @@ impl Scored {
     }
 }
 
-impl Opened {
+impl Labelled {
     /// The uncertainties of these estimators with the thesis' settings.
     pub(super) fn score(&self, choices: &[EstimatorChoice]) -> Result<Vec<Scored>> {
         let settings = EstimatorSettings::default();
@@ -158,7 +157,7 @@ impl Opened {
     /// The negative inliers of a local method.
     pub(super) fn verify(&self, method: LocalMethod, context: Context<'_>) -> Result<Scored> {
         let name = method.name();
-        let uncertainty = match inlier_counts(&self.corpus, method, &context.sources)? {
+        let uncertainty = match self.corpus.inlier_counts(method, context.corpora.sources())? {
             Verified::Counts(counts) => {
                 Ok(Inliers::named(name).estimate(&InlierCounts::new(&counts)?)?)
             }
@@ -169,7 +168,7 @@ impl Opened {
 
     /// The variances of learned encoders, each about its own matches.
     pub(super) fn score_learned(&self) -> Result<Vec<Scored>> {
-        let score = |(learned, corpus): &(Learned, Result<Corpus, String>)| {
+        let score = |(learned, corpus): &(Learned, Result<Arc<Corpus>, String>)| {
             let (uncertainty, own) = match corpus {
                 Ok(corpus) => (Ok(corpus.variance(*learned)?), Some(corpus.judged.clone())),
                 Err(why) => (Err(why.clone()), None),
@@ -229,10 +228,8 @@ impl Opened {
                     };
                     cell.within(it.low, it.high, "bootstrap over queries")
                 }
-                Err(Error::Core(err @ vpr_core::Error::Undefined { .. })) => {
-                    empty(&err.to_string())
-                }
-                Err(err) => return Err(err),
+                Err(err @ vpr_core::Error::Undefined { .. }) => empty(&err.to_string()),
+                Err(err) => return Err(err.into()),
             });
         }
         Ok(())

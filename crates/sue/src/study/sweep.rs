@@ -1,19 +1,16 @@
 //! AUC-PR over K and λ: figure 5.7.
 
-use vpr_core::{
-    Definition,
+use vpr_core::{Definition, Error as CoreError, Evaluation};
+use vpr_report::{
     figure::{Curve, Figure, Panel},
     table::{Cell, Table},
 };
 
 use super::{
     Context,
-    subject::{Opened, Subject, open},
+    subject::{Labelled, Subject, open},
 };
-use crate::{
-    EstimatorChoice, EstimatorSettings, Result, SueParams,
-    evaluate::{Evaluation, defined},
-};
+use crate::{EstimatorChoice, EstimatorSettings, Result, SueParams};
 
 pub(super) fn run(
     table: &mut Table,
@@ -47,7 +44,7 @@ pub(super) fn run(
 /// One cell and one point per setting.
 fn curve(
     table: &mut Table,
-    opened: &Opened,
+    opened: &Labelled,
     settings: impl Iterator<Item = (f64, String, SueParams)>,
 ) -> Result<Vec<(f64, f64)>> {
     let mut points = Vec::new();
@@ -63,12 +60,15 @@ fn curve(
             }
         };
         let evaluation = Evaluation::new(&uncertainty, &opened.corpus.judged)?;
-        match defined(evaluation.auc_pr(Definition::Published))? {
-            Some(value) => {
+        match evaluation.auc_pr(Definition::Published) {
+            Ok(value) => {
                 table.push(Cell { value: Some(value.into()), ..cell });
                 points.push((x, value));
             }
-            None => table.push(Cell { value: None, ..cell.noted("no best match is correct") }),
+            Err(CoreError::Undefined { .. }) => {
+                table.push(Cell { value: None, ..cell.noted("no best match is correct") });
+            }
+            Err(err) => return Err(err.into()),
         }
     }
     Ok(points)

@@ -2,12 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use super::subject::Opened;
-use crate::{
-    EstimatorChoice, EstimatorSettings, Result,
-    corpus::{Corpus, Verifier},
-    net::Learned,
-};
+use vpr_study::verification::Verifier;
+
+use super::subject::Labelled;
+use crate::{EstimatorChoice, EstimatorSettings, Result, corpus::Corpus, net::Learned};
 
 /// How long an estimator is repeated at least.
 const WINDOW: Duration = Duration::from_millis(50);
@@ -15,7 +13,7 @@ const WINDOW: Duration = Duration::from_millis(50);
 const PAIRS: usize = 5;
 
 /// Milliseconds per query of an estimator on one thread, the batch being the whole corpus.
-pub(super) fn efficient(opened: &Opened, choice: EstimatorChoice) -> Result<f64> {
+pub(super) fn efficient(opened: &Labelled, choice: EstimatorChoice) -> Result<f64> {
     let settings = EstimatorSettings::default();
     let prepared = choice.prepare(&settings, Some(&opened.corpus.poses))?;
     per_query(opened.corpus.judged.len(), || prepared.estimate(&opened.corpus.retrieval))
@@ -38,7 +36,7 @@ fn per_query(n_queries: usize, mut estimate: impl FnMut() -> Result<Vec<f64>>) -
 
 /// Milliseconds to verify one pair on one thread, features of both images included; the median of
 /// a few. `None` without images.
-pub(super) fn verification(opened: &Opened, verifier: &Verifier) -> Result<Option<f64>> {
+pub(super) fn verification(opened: &Labelled, verifier: &Verifier) -> Result<Option<f64>> {
     let Some((queries, references)) = &opened.corpus.images else { return Ok(None) };
     let best = opened.corpus.retrieval.best();
     let mut times = Vec::new();

@@ -1,6 +1,6 @@
 //! Decaying against uniform weights: table 5.4.
 
-use vpr_core::table::Table;
+use vpr_report::table::Table;
 
 use super::{
     Context,

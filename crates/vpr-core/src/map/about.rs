@@ -124,7 +124,7 @@ pub fn metric_name(metric: Metric) -> &'static str {
 pub fn parse_metric(text: &str) -> Result<Metric, String> {
     METRICS.iter().find(|(name, _)| *name == text).map(|(_, metric)| *metric).ok_or_else(|| {
         let known = METRICS.map(|(name, _)| name).join(", ");
-        format!("`{}` is none of {known}", super::header::shorten(text))
+        format!("`{}` is none of {known}", vpr_files::shorten(text))
     })
 }
 
@@ -142,7 +142,7 @@ impl FromStr for ImageSize {
         let parsed = text.split_once('x').and_then(|(width, height)| {
             Some(Self { width: width.parse().ok()?, height: height.parse().ok()? })
         });
-        parsed.ok_or_else(|| format!("`{}` is no WIDTHxHEIGHT", super::header::shorten(text)))
+        parsed.ok_or_else(|| format!("`{}` is no WIDTHxHEIGHT", vpr_files::shorten(text)))
     }
 }
 
@@ -167,7 +167,7 @@ impl FromStr for UtmZone {
             _ => None,
         };
         parsed.ok_or_else(|| {
-            let text = super::header::shorten(text);
+            let text = vpr_files::shorten(text);
             format!(
                 "`{text}` is no UTM zone: a number from 1 to 60, then N or S for the hemisphere"
             )
@@ -193,7 +193,7 @@ impl FromStr for Coordinates {
             Some(zone) => zone.parse().map(Self::Utm),
             None if text == "local" => Ok(Self::Local),
             None => {
-                Err(format!("`{}` is neither `local` nor `utm ZONE`", super::header::shorten(text)))
+                Err(format!("`{}` is neither `local` nor `utm ZONE`", vpr_files::shorten(text)))
             }
         }
     }

@@ -3,11 +3,13 @@
 use std::{fs::File, path::Path};
 
 use super::{
-    BlockDigest, access,
-    header::{ElementType, Header, TensorEntry, shorten},
+    BlockDigest,
+    header::{ElementType, Header, TensorEntry},
     layout::{self, Rows},
     touch::damaged,
 };
+use vpr_files::{access, shorten};
+
 use crate::{Error, Result};
 
 /// The file is a map of this version.

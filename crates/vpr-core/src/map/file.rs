@@ -11,11 +11,13 @@ use memmap2::Mmap;
 use ndarray::Array2;
 
 use super::{
-    About, BlockDigest, Map, RowType, access, checks,
+    About, BlockDigest, Map, RowType, checks,
     header::Header,
     layout::{self, Rows},
     touch::{Touched, check_digest, check_finite},
 };
+use vpr_files::access;
+
 use crate::{Descriptors, Error, Result};
 
 mod row_source;

@@ -4,8 +4,8 @@ use std::{collections::BTreeMap, fs::File, path::Path};
 
 use serde::{Deserialize, Serialize};
 
-use super::access::read_exact_at;
 use crate::{Error, Result};
+use vpr_files::{access::read_exact_at, shorten};
 
 /// No header is longer than this, as in the format's own implementation.
 const LONGEST_HEADER: u64 = 100_000_000;
@@ -197,15 +197,6 @@ impl Header {
             .get(name)
             .ok_or_else(|| Error::format(path, "header", format!("has no tensor `{name}`")))
     }
-}
-
-/// A name from a file, short enough for a message of one line.
-pub(super) fn shorten(name: &str) -> String {
-    let mut short: String = name.chars().take(60).flat_map(char::escape_debug).collect();
-    if name.chars().nth(60).is_some() {
-        short.push('…');
-    }
-    short
 }
 
 #[cfg(test)]

@@ -1,18 +1,15 @@
 //! The reference map: descriptors with poses, in memory and on disk.
 
 mod about;
-mod access;
 mod checks;
 mod companions;
 mod copy;
 mod digest;
-pub mod door;
 mod file;
 mod header;
 mod layout;
 mod names;
 mod open_map;
-mod replace;
 mod row_type;
 mod segments;
 mod touch;
@@ -27,7 +24,6 @@ pub use file::{Access, MapFile, Opening};
 pub use header::{ElementType, Header, TensorEntry};
 pub use names::Names;
 pub use open_map::OpenMap;
-pub use replace::{NewFile, replace};
 pub use row_type::RowType;
 pub use segments::GrowingMap;
 pub use utm::LatLon;

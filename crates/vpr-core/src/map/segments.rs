@@ -8,8 +8,9 @@ use std::{
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
-use super::{About, BlockDigest, MapFile, MapWriter, Names, Opening, RowType, layout, replace};
+use super::{About, BlockDigest, MapFile, MapWriter, Names, Opening, RowType, layout};
 use crate::{Error, Poses, Result};
+use vpr_files::replace;
 
 /// The file that says which segments a folder's map consists of.
 pub(super) const MANIFEST: &str = "manifest.json";
@@ -65,7 +66,7 @@ impl Manifest {
         let json = fs::read(&path).map_err(Error::io(&path))?;
         let manifest: Self = serde_json::from_slice(&json).map_err(|err| wrong(err.to_string()))?;
         if manifest.format != FORMAT {
-            let format = super::header::shorten(&manifest.format);
+            let format = vpr_files::shorten(&manifest.format);
             return Err(wrong(format!("format is `{format}`, this program reads `{FORMAT}`")));
         }
         if manifest.actual_digest() != manifest.digest {
@@ -74,7 +75,7 @@ impl Manifest {
         match manifest.segments.iter().find(|segment| !is_segment_name(&segment.file)) {
             None => Ok(manifest),
             Some(segment) => {
-                let file = super::header::shorten(&segment.file);
+                let file = vpr_files::shorten(&segment.file);
                 Err(wrong(format!("`{file}` is not the name of a segment")))
             }
         }

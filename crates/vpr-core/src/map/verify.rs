@@ -123,7 +123,7 @@ fn verify_names(file: &MapFile, names: &Names, problems: &mut Vec<Error>) {
             if first == row {
                 return None;
             }
-            format!("`{}` is also the name of row {first}", super::header::shorten(name))
+            format!("`{}` is also the name of row {first}", vpr_files::shorten(name))
         };
         Some(Error::format(path, format!("names, row {row}"), reason))
     });

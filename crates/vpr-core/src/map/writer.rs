@@ -8,10 +8,12 @@ use std::{
 use ndarray::ArrayView2;
 
 use super::{
-    About, BlockDigest, Map, Names, NewFile, RowType,
+    About, BlockDigest, Map, Names, RowType,
     header::{ElementType, Header, TensorEntry},
     layout::{self, Rows},
 };
+use vpr_files::NewFile;
+
 use crate::{Error, Pose, Poses, Result};
 
 /// Writes a map file: rows go to the disk as they come, the map appears under its name at the end.

@@ -8,7 +8,7 @@
 //! A metric without a value for its input is an [`Error::Undefined`], never a NaN.
 //!
 //! ```
-//! use vpr_core::metrics::{Positives, auc_pr, recall_at_precision};
+//! use crate::metrics::{Positives, auc_pr, recall_at_precision};
 //!
 //! let confidence = [0.9, 0.8, 0.7, 0.6];
 //! let correct = [true, true, false, true];
@@ -18,7 +18,7 @@
 //! let corrected = auc_pr(&confidence, &correct, Positives::Corrected { n_known: 5 })?;
 //! assert!(corrected < published);
 //! assert_eq!(recall_at_precision(1.0, &confidence, &correct, Positives::Corrected { n_known: 5 })?, 0.4);
-//! # Ok::<(), vpr_core::Error>(())
+//! # Ok::<(), crate::Error>(())
 //! ```
 //!
 //! [`Definition`]: crate::Definition
@@ -28,6 +28,7 @@ mod area;
 mod average;
 pub mod bootstrap;
 pub mod catalogue;
+mod correlation;
 mod curve;
 mod economy;
 mod invariance;
@@ -40,6 +41,7 @@ mod spacing;
 
 pub use area::auc;
 pub use average::mean_average_precision;
+pub use correlation::spearman;
 pub use curve::{Positives, PrecisionRecall, auc_pr, average_precision, precision_recall_curve};
 pub use economy::{EncodingReference, Platform, RealTimeMatches, pcu, rmf};
 pub use invariance::area_between_curves;

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use vpr_core::pickle::{Tensor as View, Value};
+use vpr_files::pickle::{Tensor as View, Value};
 
 use crate::{Error, Result};
 

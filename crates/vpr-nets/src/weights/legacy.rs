@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, collections::HashMap, ops::Range, path::Path};
 
-use vpr_core::pickle::{Element, Value, decode_checkpoint};
+use vpr_files::pickle::{Element, Value, decode_checkpoint};
 
 use super::{Tensor, checkpoint, storage};
 use crate::{Error, Result};

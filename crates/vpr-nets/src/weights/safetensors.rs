@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, path::Path};
 
 use safetensors::{Dtype, SafeTensors};
-use vpr_core::pickle::Element;
+use vpr_files::pickle::Element;
 
 use super::{Tensor, storage};
 use crate::{Error, Result};

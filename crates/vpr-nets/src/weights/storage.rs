@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, path::Path};
 
 use half::{bf16, f16};
-use vpr_core::pickle::{Element, Tensor as View};
+use vpr_files::pickle::{Element, Tensor as View};
 
 use super::Tensor;
 use crate::{Error, Result};

@@ -7,7 +7,7 @@ use std::{
     path::Path,
 };
 
-use vpr_core::pickle::decode_checkpoint;
+use vpr_files::pickle::decode_checkpoint;
 use zip::{CompressionMethod, ZipArchive};
 
 use super::{Tensor, checkpoint, storage};

@@ -6,10 +6,8 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use object_npy::ground_truth_npy;
-use vpr_core::{
-    Error, GroundTruth, Poses,
-    dataset::{DataRoots, Dataset, DatasetEntry, layout::pose_csv::PoseTable},
-};
+use vpr_core::{Error, GroundTruth, Poses, Provenance};
+use vpr_data::{DataRoots, Dataset, DatasetEntry, layout::pose_csv::PoseTable};
 
 use crate::{
     family::{Plan, Shot},
@@ -192,22 +190,23 @@ pub(crate) fn open(recipe: &Recipe, folder: &Path) -> vpr_core::Result<Dataset> 
         id: format!("world/{}", recipe.name),
         name: format!("{} (generated)", recipe.name),
         layout: match recipe.layout {
-            Layout::Utm => vpr_core::dataset::Layout::UtmNames,
-            Layout::VprBench | Layout::SevenScenes => vpr_core::dataset::Layout::VprBench,
+            Layout::Utm => vpr_data::Layout::UtmNames,
+            Layout::VprBench | Layout::SevenScenes => vpr_data::Layout::VprBench,
         },
         path: PathBuf::from(if recipe.layout == Layout::Utm { "images/test" } else { "." }),
         matches: None,
         queries: Some(queries.names.len()),
         references: Some(references.names.len()),
         tolerance: match recipe.tolerance {
-            Tolerance::Frames(frames) => vpr_core::dataset::Tolerance::Frames(frames),
-            Tolerance::RadiusM(radius) => vpr_core::dataset::Tolerance::Metres(radius),
+            Tolerance::Frames(frames) => vpr_data::Tolerance::Frames(frames),
+            Tolerance::RadiusM(radius) => vpr_data::Tolerance::Metres(radius),
         },
         spacing_m: None,
         frames: None,
         origin: format!("generated; counterpart: {}", recipe.counterpart),
         licence: "that of this toolkit".to_owned(),
         note: None,
+        provenance: Provenance::Generated,
     };
     let mut dataset = Dataset::open(&entry, &DataRoots::new([folder.to_owned()]))?;
     for (images, table) in [(&dataset.references, &references), (&dataset.queries, &queries)] {
@@ -254,7 +253,7 @@ fn seven_scenes(
         truth,
         n_clamped: 0,
         poses: Some((queries.poses.clone(), references.poses.clone())),
-        provenance: vpr_core::table::Provenance::Generated,
+        provenance: Provenance::Generated,
     }
 }
 

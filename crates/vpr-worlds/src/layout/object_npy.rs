@@ -48,7 +48,7 @@ fn push_int(bytes: &mut Vec<u8>, value: i32) {
 
 #[cfg(test)]
 mod tests {
-    use vpr_core::dataset::layout::vpr_bench::GroundTruthFile;
+    use vpr_data::layout::vpr_bench::GroundTruthFile;
 
     use super::*;
 

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use anyhow::{bail, ensure};
 use ndarray::Array2;
 use vpr_core::{
-    Descriptors, Retrieval, cli,
+    Descriptors, Retrieval,
     knn::{Hnsw, HnswParams, SearchParams, row},
     map::{Access, OpenMap, Opening},
 };
+use vpr_report::cli;
 
 /// Neighbours and queries that the recall kept beside a graph is of.
 const MEASURED_K: usize = 10;

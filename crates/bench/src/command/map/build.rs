@@ -4,14 +4,11 @@ use std::path::PathBuf;
 
 use vpr_core::{
     Error,
-    cli::{self, Outcome},
     knn::Metric,
-    map::{
-        About, Coordinates, GrowingMap, ImageSize, RowType,
-        door::{self, Format},
-        parse_metric,
-    },
+    map::{About, Coordinates, GrowingMap, ImageSize, RowType, parse_metric},
 };
+use vpr_data::exchange::{self, Format};
+use vpr_report::cli::{self, Outcome};
 
 use super::format_of;
 
@@ -62,7 +59,7 @@ pub(super) struct BuildArgs {
 }
 
 pub(super) fn run(args: &BuildArgs) -> anyhow::Result<Outcome> {
-    let read = |path: &PathBuf, format| anyhow::Ok(door::read(format_of(format, path)?, path)?);
+    let read = |path: &PathBuf, format| anyhow::Ok(exchange::read(format_of(format, path)?, path)?);
     let mut parts = read(&args.descriptors, args.descriptors_format)?;
     if let Some(poses) = &args.poses {
         parts = parts.join(read(poses, args.poses_format)?).map_err(|err| err.in_file(poses))?;

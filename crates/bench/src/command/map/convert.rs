@@ -2,13 +2,9 @@
 
 use std::path::PathBuf;
 
-use vpr_core::{
-    cli::{self, Outcome},
-    map::{
-        OpenMap, Opening, RowType, copy_as,
-        door::{self, Format, Kind},
-    },
-};
+use vpr_core::map::{OpenMap, Opening, RowType, copy_as};
+use vpr_data::exchange::{self, Format, Kind};
+use vpr_report::cli::{self, Outcome};
 
 use super::{format_of, format_to};
 
@@ -40,15 +36,15 @@ pub(super) fn run(args: &ConvertArgs) -> anyhow::Result<Outcome> {
         return Ok(Outcome::Success);
     }
     if from.kind() == Kind::Pairs || to.kind() == Kind::Pairs {
-        let pairs = door::read_pairs(from, &args.input)?;
-        door::write_pairs(to, &args.out, &pairs)?;
+        let pairs = exchange::read_pairs(from, &args.input)?;
+        exchange::write_pairs(to, &args.out, &pairs)?;
         cli::note(&format!("wrote the references of {} queries", pairs.lists.len()));
         return Ok(Outcome::Success);
     }
-    let parts = door::read(from, &args.input)?;
+    let parts = exchange::read(from, &args.input)?;
     match (to, args.row_type) {
         (Format::Map, Some(row_type)) => parts.write_map(&args.out, row_type),
-        _ => door::write(to, &args.out, &parts),
+        _ => exchange::write(to, &args.out, &parts),
     }
     .map_err(|err| err.in_file(&args.input))?;
     Ok(Outcome::Success)

@@ -2,10 +2,8 @@
 
 use std::{fmt::Write as _, path::PathBuf};
 
-use vpr_core::{
-    cli::{self, Outcome},
-    map::{OpenMap, Opening},
-};
+use vpr_core::map::{OpenMap, Opening};
+use vpr_report::cli::{self, Outcome};
 
 #[derive(clap::Args)]
 pub(super) struct InfoArgs {

@@ -2,10 +2,8 @@
 
 use std::path::PathBuf;
 
-use vpr_core::{
-    cli::{self, Outcome},
-    map::{OpenMap, Opening, merge},
-};
+use vpr_core::map::{OpenMap, Opening, merge};
+use vpr_report::cli::{self, Outcome};
 
 #[derive(clap::Args)]
 pub(super) struct MergeArgs {

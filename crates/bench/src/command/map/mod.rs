@@ -12,7 +12,8 @@ mod verify;
 use std::path::Path;
 
 use clap::Subcommand;
-use vpr_core::{cli::Outcome, map::door::Format};
+use vpr_data::exchange::Format;
+use vpr_report::cli::Outcome;
 
 /// Work with reference maps on disk.
 #[derive(clap::Args)]

@@ -4,14 +4,11 @@ use std::{fmt::Write as _, path::PathBuf, str::FromStr};
 
 use vpr_core::{
     Error, Position, Retrieval,
-    cli::{self, Outcome},
     knn::{self, Metric, PositionIndex, SearchParams},
-    map::{
-        Access, Names, OpenMap, Opening,
-        door::{self, Format, PairList, Pairs},
-        parse_metric,
-    },
+    map::{Access, Names, OpenMap, Opening, parse_metric},
 };
+use vpr_data::exchange::{self, Format, PairList, Pairs};
+use vpr_report::cli::{self, Outcome};
 
 use super::format_of;
 
@@ -77,7 +74,7 @@ impl FromStr for Near {
 pub(super) fn run(args: &SearchArgs) -> anyhow::Result<Outcome> {
     let access = if args.mapped { Access::Mapped } else { Access::Read };
     let map = OpenMap::open(&args.map, Opening { access, trust: args.trust })?;
-    let queries = door::read(format_of(args.queries_format, &args.queries)?, &args.queries)?;
+    let queries = exchange::read(format_of(args.queries_format, &args.queries)?, &args.queries)?;
     let none = || Error::Empty("descriptors").in_file(&args.queries);
     let descriptors = queries.descriptors.ok_or_else(none)?;
     let metric = args.metric.or(map.about().metric).unwrap_or_default();
@@ -97,7 +94,7 @@ pub(super) fn run(args: &SearchArgs) -> anyhow::Result<Outcome> {
     };
     let pairs = pairs_of(&retrieval, queries.names.as_ref(), map.names()?.as_ref());
     if let Some(out) = &args.out {
-        door::write_pairs(args.to, out, &pairs)?;
+        exchange::write_pairs(args.to, out, &pairs)?;
         return Ok(Outcome::Success);
     }
     let mut text = String::from("query,rank,reference,distance\n");

@@ -2,10 +2,8 @@
 
 use std::path::PathBuf;
 
-use vpr_core::{
-    cli::{self, Outcome},
-    map::door::{self, Format},
-};
+use vpr_data::exchange::{self, Format};
+use vpr_report::cli::{self, Outcome};
 
 use super::format_of;
 
@@ -24,7 +22,7 @@ pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<Outcome> {
         let extension = args.path.extension().unwrap_or_default();
         (extension == "safetensors" && Format::guess(&args.path).is_err()).then_some(Format::Map)
     });
-    let problems = door::problems(format_of(named, &args.path)?, &args.path);
+    let problems = exchange::problems(format_of(named, &args.path)?, &args.path);
     for problem in &problems {
         cli::print(&format!("{problem}\n"))?;
     }

@@ -1,11 +1,8 @@
 //! The domain gap: recall@1 on different kinds of places at equal viewpoint change.
 
 use serde::Deserialize;
-use vpr_core::{
-    Error, Result,
-    metrics::bootstrap::Interval,
-    table::{Cell, Provenance, Table},
-};
+use vpr_core::{Error, Provenance, Result, metrics::bootstrap::Interval};
+use vpr_report::table::{Cell, Table};
 
 use super::{super::Context, recall, techniques};
 
@@ -27,14 +24,14 @@ pub(super) fn run(table: &mut Table, domains: &[Domain], context: Context<'_>) -
         let mut known: Vec<(&str, Interval)> = Vec::new();
         for domain in domains {
             let row = format!("domain: {}", domain.name);
-            let Some(here) = recall(table, &row, &domain.world, &runner, context)? else {
+            let Some(here) = recall(table, &row, &domain.world, runner, context)? else {
                 continue;
             };
             let home = known.iter().find(|(name, _)| Some(*name) == domain.home.as_deref());
             if let Some((home, there)) = home {
                 let (gap, low, high) = difference(there, &here);
                 let row = format!("domain gap: {home} minus {}", domain.name);
-                let cell = Cell::new(row, runner.0, gap, Provenance::Generated, 2);
+                let cell = Cell::new(row, runner.column, gap, Provenance::Generated, 2);
                 table.push(cell.within(low, high, "Newcombe"));
             }
             known.push((&domain.name, here));

@@ -3,17 +3,15 @@
 
 use std::path::Path;
 
-use vpr_core::{
-    Result,
+use vpr_core::{Result, metrics::spearman};
+use vpr_report::{
     figure::{Curve, Figure, Panel},
     table::{Cell, Table},
 };
+use vpr_study::Direction;
 use vpr_vision::image;
 
-use super::{
-    super::{Context, subject::match_images},
-    techniques,
-};
+use super::{super::Context, techniques};
 
 /// Blocks per side in which brightness is compared.
 const BLOCKS: usize = 8;
@@ -50,9 +48,10 @@ pub(super) fn run(
         is_scatter: true,
         ..Panel::default()
     };
-    for (column, technique) in techniques(context)? {
-        let scores = match_images(technique.as_ref(), column, &dataset, true, context)?;
-        let scores = scores.similarities.view().row(0).to_vec();
+    for runner in techniques(context)? {
+        let column = runner.column;
+        let scores = context.sources.scores(runner, &dataset, Direction::Swapped)?;
+        let scores = scores.similarities().view().row(0).to_vec();
         let pairs: Vec<(Change, f64)> =
             others.iter().map(|&light| (changes[light], scores[light])).collect();
         let n = pairs.len();
@@ -98,25 +97,12 @@ fn change(key: &[f64], light: &[f64]) -> Change {
     Change { split: variance.sqrt(), even: mean.abs() }
 }
 
-/// Spearman's rank correlation of the score with a property of the light.
+/// Spearman's rank correlation of the score with a property of the light; NaN-free: 0 where one of
+/// them never changes.
 fn rank_correlation(pairs: &[(Change, f64)], property: impl Fn(&Change) -> f64) -> f64 {
-    let x = ranks(&pairs.iter().map(|(change, _)| property(change)).collect::<Vec<_>>());
-    let y = ranks(&pairs.iter().map(|(_, score)| *score).collect::<Vec<_>>());
-    let middle = (pairs.len() as f64 - 1.0) / 2.0;
-    let product = |a: &[f64], b: &[f64]| -> f64 {
-        a.iter().zip(b).map(|(a, b)| (a - middle) * (b - middle)).sum()
-    };
-    product(&x, &y) / (product(&x, &x) * product(&y, &y)).sqrt()
-}
-
-/// The rank of every value from zero, equal ones sharing the mean of theirs.
-fn ranks(values: &[f64]) -> Vec<f64> {
-    let rank = |value: &f64| {
-        let below = values.iter().filter(|it| it.total_cmp(value).is_lt()).count() as f64;
-        let equal = values.iter().filter(|it| it.total_cmp(value).is_eq()).count() as f64;
-        below + (equal - 1.0) / 2.0
-    };
-    values.iter().map(rank).collect()
+    let (x, y): (Vec<f64>, Vec<f64>) =
+        pairs.iter().map(|(change, score)| (property(change), *score)).unzip();
+    spearman(&x, &y).unwrap_or(0.0)
 }
 
 /// Mean score of the half of the lights that splits least, and of the other; a middle one counts
@@ -151,6 +137,5 @@ mod tests {
         let pairs = [pair(0.1, 9.0), pair(0.2, 4.0), pair(0.9, 1.0), pair(0.3, 3.0)];
         assert!((rank_correlation(&pairs, |it| it.split) + 1.0).abs() < 1e-12);
         assert_eq!(halves(&pairs), (6.5, 2.0));
-        assert_eq!(ranks(&[3.0, 1.0, 3.0]), [1.5, 0.0, 1.5]);
     }
 }

@@ -7,15 +7,18 @@ use nalgebra::{DMatrix, DVector};
 use ndarray::Array2;
 use serde::Deserialize;
 use vpr_core::{
-    Descriptors, Result,
-    dataset::Dataset,
-    figure::{Curve, Figure, Panel},
+    Descriptors, Provenance, Result,
     knn::{Pca, PcaParams},
-    table::{Cell, Provenance, Table},
+};
+use vpr_data::Dataset;
+use vpr_report::{
+    figure::{Curve, Figure, Panel},
+    table::{Cell, Table},
 };
 
+use vpr_study::{Features, Runner};
+
 use super::{super::Context, techniques};
-use crate::technique::{Describe, Features};
 
 /// Which sets are compared.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -51,7 +54,7 @@ pub(super) fn run(
             if let Some(dataset) = context.images(id)? {
                 sets.push((dataset, is_real));
             } else {
-                let why = context.data.why_absent(id, "images")?;
+                let why = context.sources.why_absent(id, "images")?;
                 table.push(Cell::absent("likeness to real places", id, why));
             }
         }
@@ -59,8 +62,9 @@ pub(super) fn run(
     if !sets.iter().any(|(_, is_real)| *is_real) {
         return Ok(());
     }
-    for (column, technique) in techniques(context)? {
-        let Some(clouds) = clouds(technique.as_ref(), column, &sets, likeness, context)? else {
+    for runner in techniques(context)? {
+        let column = runner.column;
+        let Some(clouds) = clouds(runner, &sets, likeness, context)? else {
             continue;
         };
         report(table, column, &clouds);
@@ -72,8 +76,7 @@ pub(super) fn run(
 /// Describes evenly spaced references of every set and projects all together; `None` for a
 /// technique without one vector per image.
 fn clouds(
-    technique: &dyn Describe,
-    column: &str,
+    runner: &Runner,
     sets: &[(Arc<Dataset>, bool)],
     likeness: &Likeness,
     context: Context<'_>,
@@ -81,19 +84,15 @@ fn clouds(
     let mut rows: Vec<f32> = Vec::new();
     let mut lengths = Vec::new();
     let mut dim = 0;
-    context.observer.start(&format!("{column} on real and generated places"), sets.len());
     for (dataset, _) in sets {
         let images = evenly(&dataset.references, likeness.images);
-        let Features::Vectors(descriptors) = technique.encode(&images, &|| ())? else {
-            context.observer.end();
-            return Ok(None);
-        };
-        context.observer.step();
+        let what = format!("{} on {}", runner.column, dataset.name);
+        let features = context.sources.features(runner, &images, &what)?;
+        let Features::Vectors(descriptors) = features else { return Ok(None) };
         dim = descriptors.dim();
         lengths.push(descriptors.len());
         rows.extend(descriptors.as_slice());
     }
-    context.observer.end();
     let n: usize = lengths.iter().sum();
     let all = Array2::from_shape_fn((n, dim), |(row, value)| rows[row * dim + value]);
     let all = Descriptors::new(all)?;

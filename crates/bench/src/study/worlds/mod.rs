@@ -9,20 +9,19 @@ mod likeness;
 use serde::Deserialize;
 use vpr_core::{
     Result,
-    figure::Figure,
     metrics::bootstrap::{Interval, Z_95, wilson_interval},
+};
+use vpr_report::{
+    figure::Figure,
     table::{Cell, Table},
 };
 
-pub use dial::Dial;
 pub use gap::Domain;
 pub use likeness::Likeness;
 
-use super::{
-    Context,
-    subject::{HOG_THESIS, Runner, match_images, runners},
-};
-use crate::evaluate::Evaluation;
+use vpr_study::{Dial, Direction, Runner, technique::HOG_THESIS};
+
+use super::Context;
 
 /// The parts of the page.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -54,8 +53,8 @@ pub(super) fn run(
 }
 
 /// One configuration of each technique.
-fn techniques(context: Context<'_>) -> Result<impl Iterator<Item = Runner>> {
-    Ok(runners(context)?.into_iter().filter(|(column, _)| *column != HOG_THESIS))
+fn techniques(context: Context<'_>) -> Result<impl Iterator<Item = &Runner>> {
+    Ok(context.sources.runners()?.iter().filter(|runner| runner.name != HOG_THESIS))
 }
 
 /// Recall@1 of a technique on a generated dataset, of the queries that have a correct reference,
@@ -64,19 +63,19 @@ fn recall(
     table: &mut Table,
     row: &str,
     id: &str,
-    (column, technique): &Runner,
+    runner: &Runner,
     context: Context<'_>,
 ) -> Result<Option<Interval>> {
     let Some(dataset) = context.images(id)? else {
-        table.push(Cell::absent(row, *column, context.data.why_absent(id, "images")?));
+        table.push(Cell::absent(row, runner.column, context.sources.why_absent(id, "images")?));
         return Ok(None);
     };
-    let scores = match_images(technique.as_ref(), column, &dataset, false, context)?;
-    let evaluation = Evaluation::new(&scores.similarities, &dataset.truth)?;
-    let n_hits = evaluation.correct().iter().filter(|&&is_correct| is_correct).count();
+    let scores = context.sources.scores(runner, &dataset, Direction::AsReleased)?;
+    let correct = dataset.truth.judge(&scores.best().reference)?;
+    let n_hits = correct.iter().filter(|&&is_correct| is_correct).count();
     let n = dataset.truth.n_known();
     let interval = wilson_interval(n_hits, n, Z_95)?;
-    let cell = Cell::new(row, *column, interval.estimate, dataset.provenance, n);
+    let cell = Cell::new(row, runner.column, interval.estimate, dataset.provenance, n);
     table.push(cell.within(interval.low, interval.high, "Wilson"));
     Ok(Some(interval))
 }

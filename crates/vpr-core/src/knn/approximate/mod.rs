@@ -20,10 +20,8 @@ use usearch::Index;
 
 use self::{codes::Coder, sidecar::Sidecar};
 use super::{Metric, RowSource, SearchParams, rescore, search};
-use crate::{
-    Descriptors, Error, Result, Retrieval,
-    map::{BlockDigest, NewFile, replace},
-};
+use crate::{Descriptors, Error, Result, Retrieval, map::BlockDigest};
+use vpr_files::{NewFile, replace};
 
 /// How the graph holds the references. It only chooses candidates, so small is enough.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,7 +1,0 @@
-//! One file per on-disk layout, read as the originals are.
-
-pub mod npz_images;
-pub mod pose_csv;
-pub mod seven_scenes;
-pub mod utm_names;
-pub mod vpr_bench;

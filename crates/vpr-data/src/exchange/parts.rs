@@ -1,0 +1,143 @@
+//! What a file of another program knows of images.
+
+use std::path::Path;
+
+use vpr_core::{
+    Descriptors, Error, Map, Pose, Poses, Result,
+    map::{About, MapWriter, Names, OpenMap, RowType},
+};
+
+/// Names, descriptors and poses of the same images in the same order, as far as a file has them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Parts {
+    /// Names of the images.
+    pub names: Option<Names>,
+    /// Their descriptors.
+    pub descriptors: Option<Descriptors>,
+    /// Their poses.
+    pub poses: Option<Poses>,
+    /// What else is known.
+    pub about: About,
+}
+
+/// References in order of nearness for every query, by name.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Pairs {
+    /// One entry per query, in the order of the queries.
+    pub lists: Vec<PairList>,
+}
+
+/// The references of one query.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PairList {
+    /// Name of the query.
+    pub query: String,
+    /// Names of the references, nearest first.
+    pub references: Vec<String>,
+}
+
+impl Parts {
+    /// The content of an open map, in memory.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`OpenMap::descriptors`], [`OpenMap::poses`] and [`OpenMap::names`].
+    pub fn of_map(map: &OpenMap) -> Result<Self> {
+        Ok(Self {
+            names: map.names()?,
+            descriptors: Some(map.descriptors()?),
+            poses: map.poses()?,
+            about: map.about().clone(),
+        })
+    }
+
+    /// Checks that all parts are of equally many images.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Mismatch`] if not.
+    pub fn check(&self) -> Result<()> {
+        let lengths = [
+            ("image names", self.names.as_ref().map(Names::len)),
+            ("descriptors", self.descriptors.as_ref().map(Descriptors::len)),
+            ("poses", self.poses.as_ref().map(Poses::len)),
+        ];
+        let known: Vec<_> =
+            lengths.into_iter().filter_map(|(what, len)| Some((what, len?))).collect();
+        match known.iter().find(|(_, len)| *len != known[0].1) {
+            None => Ok(()),
+            Some(&(what, actual)) => Err(Error::Mismatch { what, expected: known[0].1, actual }),
+        }
+    }
+
+    /// Takes names and poses from another file of the same images: by name if both have names,
+    /// by order otherwise.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Mismatch`] if the numbers of images differ and there are no names to go by;
+    /// [`Error::Unknown`] if an image has no pose.
+    pub fn join(mut self, other: Self) -> Result<Self> {
+        let about = other.about;
+        self.about.coordinates = self.about.coordinates.or(about.coordinates);
+        let (Some(names), Some(other_names), Some(poses)) =
+            (&self.names, &other.names, &other.poses)
+        else {
+            self.names = self.names.or(other.names);
+            self.poses = other.poses.or(self.poses);
+            self.check()?;
+            return Ok(self);
+        };
+        let row_of: std::collections::HashMap<&str, usize> = other_names.iter().zip(0..).collect();
+        let rows = names.iter().map(|name| {
+            row_of.get(name).copied().ok_or_else(|| {
+                let known = format!("{} images, such as {:?}", row_of.len(), other_names.get(0));
+                Error::Unknown { kind: "pose of image", name: name.to_owned(), known }
+            })
+        });
+        let rows: Vec<usize> = rows.collect::<Result<_>>()?;
+        self.poses = Some(poses.select(&rows));
+        Ok(self)
+    }
+
+    /// The map of these parts.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Empty`] if descriptors or poses are missing, and those of [`Map::new`].
+    pub fn into_map(self) -> Result<Map> {
+        let descriptors = self.descriptors.ok_or(Error::Empty("descriptors in the file"))?;
+        Map::new(descriptors, self.poses.ok_or(Error::Empty("poses in the file"))?)
+    }
+
+    /// Writes one map file.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Empty`] if there are no descriptors, and those of [`MapWriter`].
+    pub fn write_map(&self, path: &Path, row_type: RowType) -> Result<()> {
+        self.check()?;
+        let descriptors = self.descriptors()?;
+        let mut writer = MapWriter::create(path, descriptors.dim(), row_type, self.about.clone())?;
+        writer.append(descriptors.view(), self.poses.as_ref(), self.names.as_ref())?;
+        writer.finish().map(drop)
+    }
+
+    pub(super) fn descriptors(&self) -> Result<&Descriptors> {
+        self.descriptors.as_ref().ok_or(Error::Empty("descriptors in the file"))
+    }
+
+    pub(super) fn poses(&self) -> Result<&Poses> {
+        self.poses.as_ref().ok_or(Error::Empty("poses in the file"))
+    }
+
+    pub(super) fn six_dof(&self) -> Result<&[Pose]> {
+        self.poses()?.six_dof()
+    }
+
+    /// The name of an image, or its number in six digits.
+    pub(super) fn name(&self, row: usize) -> String {
+        let name = self.names.as_ref().and_then(|names| names.get(row));
+        name.map_or_else(|| format!("{row:06}"), str::to_owned)
+    }
+}

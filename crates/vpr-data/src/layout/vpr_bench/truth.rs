@@ -1,0 +1,91 @@
+//! `ground_truth_new.npy`: an object array of `[query, list of references]`, one row per query.
+
+use std::path::{Path, PathBuf};
+
+use vpr_core::{Error, GroundTruth, Result};
+use vpr_files::{npy, pickle::Value};
+
+/// The ground truth of a VPR-Bench dataset, as the file has it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GroundTruthFile {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// The correct references of every query; `[-1]` for a query at a new place. References that do
+    /// not exist are kept as they are.
+    pub lists: Vec<Vec<i64>>,
+}
+
+impl GroundTruthFile {
+    /// Reads the file; rows may be in any order, and every query has exactly one.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`], or [`Error::Format`] with the row (or byte) and what is wrong there.
+    pub fn read(path: &Path) -> Result<Self> {
+        let (shape, values) = npy::read_objects(path)?;
+        if shape.len() != 2 || shape[1] != 2 {
+            let reason = format!("expected rows of query and references, got shape {shape:?}");
+            return Err(Error::format(path, "shape", reason));
+        }
+        let mut lists: Vec<Option<Vec<i64>>> = vec![None; shape[0]];
+        for (row, pair) in values.chunks_exact(2).enumerate() {
+            let err = |reason: String| Error::format(path, format!("row {row}"), reason);
+            let (query, references) = row_of(pair).map_err(err)?;
+            let slot = lists
+                .get_mut(query)
+                .ok_or_else(|| err(format!("query {query}: there are only {} rows", shape[0])))?;
+            if slot.replace(references).is_some() {
+                return Err(err(format!("query {query} has a row already")));
+            }
+        }
+        // As many rows as queries and none twice: every query has one.
+        Ok(Self { path: path.to_owned(), lists: lists.into_iter().flatten().collect() })
+    }
+
+    /// Number of queries.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.lists.len()
+    }
+
+    /// Whether there is no query.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.lists.is_empty()
+    }
+
+    /// The truth for a map of `n_references`, and how many list entries pointed past it.
+    ///
+    /// Those are dropped, as [`GroundTruth::clamped`] says; a list of nothing but `-1` is a new
+    /// place.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] with the query if a negative index is not the only one of its list.
+    pub fn truth(&self, n_references: usize) -> Result<(GroundTruth, usize)> {
+        let list = |(query, list): (usize, &Vec<i64>)| {
+            if list.as_slice() == [-1] {
+                return Ok(Vec::new());
+            }
+            let index = |&index: &i64| {
+                usize::try_from(index).map_err(|_| {
+                    let reason = format!("{index} is not a reference; a new place is [-1]");
+                    Error::format(&self.path, format!("query {query}"), reason)
+                })
+            };
+            list.iter().map(index).collect()
+        };
+        let lists = self.lists.iter().enumerate().map(list).collect::<Result<_>>()?;
+        Ok(GroundTruth::clamped(lists, n_references))
+    }
+}
+
+/// The query and the references of one row.
+fn row_of(pair: &[Value]) -> Result<(usize, Vec<i64>), String> {
+    let query = pair[0].as_i64().and_then(|query| usize::try_from(query).ok());
+    let query = query.ok_or_else(|| format!("the query is {}, not an index", pair[0].kind()))?;
+    let references = pair[1]
+        .to_i64s()
+        .ok_or_else(|| format!("the references are {}, not a list of integers", pair[1].kind()))?;
+    Ok((query, references))
+}

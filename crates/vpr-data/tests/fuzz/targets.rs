@@ -1,0 +1,221 @@
+//! The parsers, how each is called, and the sound files that damage starts from.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use ndarray::Array2;
+use vpr_core::{
+    Descriptors, Error, PlanarPosition, Pose, Poses,
+    knn::{Pca, PcaParams},
+    map::{About, Coordinates, GrowingMap, RowType, UtmZone, verify},
+};
+use vpr_data::{
+    exchange::{self, Format, PairList, Pairs, Parts},
+    layout::{
+        pose_csv::PoseTable,
+        vpr_bench::{GroundTruthFile, PublishedMatches, read_areas, read_curves},
+    },
+    manifest::Manifest,
+};
+use vpr_files::{npy, pickle};
+
+/// One parser.
+pub(crate) struct Target {
+    /// Also the name of its folder in the corpus.
+    pub(crate) name: &'static str,
+    /// The damaged file, relative to the folder of the test.
+    pub(crate) file: &'static str,
+    /// Reads the file in that folder; every problem it finds.
+    pub(crate) read: fn(&Path) -> Vec<Error>,
+    /// Whether no truncation and no flipped bit may go unnoticed.
+    pub(crate) notices_all: bool,
+}
+
+/// A target that reads the file `file` of a format.
+macro_rules! file_target {
+    ($name:literal, $file:literal, $format:expr) => {
+        Target {
+            name: $name,
+            file: $file,
+            read: |folder| exchange::problems($format, &folder.join($file)),
+            notices_all: false,
+        }
+    };
+}
+
+/// A target that reads the file `file` by one function.
+macro_rules! read_target {
+    ($name:literal, $file:literal, $read:expr) => {
+        Target {
+            name: $name,
+            file: $file,
+            read: |folder| ($read)(&folder.join($file)).err().into_iter().collect(),
+            notices_all: false,
+        }
+    };
+}
+
+/// A target that reads the folder that `file` lies in.
+macro_rules! folder_target {
+    ($name:literal, $file:literal, $format:expr) => {
+        Target {
+            name: $name,
+            file: $file,
+            read: |folder| exchange::problems($format, folder),
+            notices_all: false,
+        }
+    };
+}
+
+pub(crate) const TARGETS: &[Target] = &[
+    Target {
+        name: "map",
+        file: "map.safetensors",
+        read: |folder| {
+            let path = folder.join("map.safetensors");
+            let read = exchange::read(Format::Map, &path).err();
+            let mut problems = verify(&path);
+            assert!(read.is_none() || !problems.is_empty(), "{read:?} is no problem for verify");
+            problems.extend(read);
+            problems
+        },
+        notices_all: true,
+    },
+    Target {
+        name: "manifest",
+        file: "manifest.json",
+        read: |folder| exchange::problems(Format::Map, folder),
+        notices_all: false,
+    },
+    file_target!("safetensors", "a.safetensors", Format::Safetensors),
+    file_target!("npz", "a.npz", Format::Npz),
+    file_target!("hloc-h5", "a.h5", Format::HlocH5),
+    file_target!("hloc-pairs", "a.txt", Format::HlocPairs),
+    file_target!("hloc-poses", "a.txt", Format::HlocPoses),
+    file_target!("tum", "a.txt", Format::Tum),
+    file_target!("kitti", "a.txt", Format::Kitti),
+    file_target!("latlon", "a.csv", Format::LatLon),
+    file_target!("csv", "a.csv", Format::PoseCsv),
+    file_target!("utm-names", "a.txt", Format::UtmNames),
+    folder_target!("7scenes", "frame-000000.pose.txt", Format::SevenScenes),
+    folder_target!("kapture-trajectories", "sensors/trajectories.txt", Format::Kapture),
+    folder_target!("vpr-eval", "database_descriptors.npy", Format::VprEval),
+    Target {
+        name: "vpr-eval-preds",
+        file: "preds/000.txt",
+        read: |folder| exchange::read_pairs(Format::VprEval, folder).err().into_iter().collect(),
+        notices_all: false,
+    },
+    file_target!("npy", "a.npy", Format::Npy),
+    read_target!("pca", "a.json", Pca::open),
+    read_target!("dataset-manifest", "a.toml", Manifest::read),
+    read_target!("pose-table", "a.csv", PoseTable::read),
+    read_target!("vpr-bench-matches", "a.npy", PublishedMatches::read),
+    read_target!("vpr-bench-truth", "a.npy", |path: &Path| {
+        GroundTruthFile::read(path)?.truth(10)
+    }),
+    read_target!("vpr-bench-curves", "a.pickle", read_curves),
+    read_target!("vpr-bench-areas", "a.pickle", read_areas),
+    Target {
+        name: "npy-objects",
+        file: "a.npy",
+        read: |folder| {
+            npy::read_objects(&folder.join("a.npy")).err().map(Into::into).into_iter().collect()
+        },
+        notices_all: false,
+    },
+    Target {
+        name: "pickle",
+        file: "a.pickle",
+        read: |folder| {
+            pickle::read(&folder.join("a.pickle")).err().map(Into::into).into_iter().collect()
+        },
+        notices_all: false,
+    },
+];
+
+fn parts(n: usize) -> Parts {
+    let pose = |row: usize| {
+        let turn = [0.1, 0.2, row as f64].into();
+        Pose::new([row as f64, -2.5, 0.25].into(), turn)
+    };
+    let descriptors =
+        Array2::from_shape_fn((n, 5), |(row, column)| (row * 5 + column) as f32 * 0.1);
+    Parts {
+        names: Some((0..n).map(|row| format!("db/frame-{row:06}.color.png")).collect()),
+        descriptors: Some(Descriptors::new(descriptors).unwrap()),
+        poses: Some(Poses::SixDof((0..n).map(pose).collect())),
+        about: About { encoder: Some("HOG".to_owned()), ..About::default() },
+    }
+}
+
+/// A small projection, saved in this folder.
+fn pca(folder: &Path) -> PathBuf {
+    let params = PcaParams { n_components: 2, whiten: true };
+    let rows = Array2::from_shape_fn((9, 3), |(row, column)| ((row * 7 + column * 3) % 5) as f32);
+    let path = folder.join("pca");
+    Pca::fit(&Descriptors::new(rows).unwrap(), &params).unwrap().save(&path).unwrap();
+    path
+}
+
+/// Writes one sound file of every format, and keeps what is there already.
+pub(crate) fn write_seeds(corpus: &Path) {
+    let folder = tempfile::tempdir().unwrap();
+    let seed = |target: &str, name: &str, file: &Path| {
+        let place = corpus.join(target);
+        fs::create_dir_all(&place).unwrap();
+        fs::copy(file, place.join(name)).unwrap();
+    };
+    let six_dof = parts(3);
+    for (target, format, row_type) in [
+        ("safetensors", Format::Safetensors, None),
+        ("npz", Format::Npz, None),
+        ("hloc-h5", Format::HlocH5, None),
+        ("hloc-poses", Format::HlocPoses, None),
+        ("tum", Format::Tum, None),
+        ("kitti", Format::Kitti, None),
+        ("csv", Format::PoseCsv, None),
+        ("pose-table", Format::PoseCsv, None),
+        ("npy", Format::Npy, None),
+        ("map", Format::Map, Some(RowType::I8)),
+        ("map", Format::Map, Some(RowType::F16)),
+    ] {
+        let path = folder.path().join("seed");
+        let name = row_type.map_or("sound".to_owned(), |row_type| format!("sound-{row_type}"));
+        match row_type {
+            Some(row_type) => six_dof.write_map(&path, row_type).unwrap(),
+            None => exchange::write(format, &path, &six_dof).unwrap(),
+        }
+        seed(target, &name, &path);
+    }
+    seed("pca", "sound", &pca(folder.path()));
+    let place = |name: &str| folder.path().join(name);
+    exchange::write(Format::SevenScenes, &place("scene"), &parts(1)).unwrap();
+    seed("7scenes", "sound", &place("scene/frame-000000.pose.txt"));
+    exchange::write(Format::Kapture, &place("kapture"), &six_dof).unwrap();
+    seed("kapture-trajectories", "sound", &place("kapture/sensors/trajectories.txt"));
+    exchange::write(Format::VprEval, &place("eval"), &six_dof).unwrap();
+    seed("vpr-eval", "sound", &place("eval/database_descriptors.npy"));
+    let list = |query: &str| PairList {
+        query: query.to_owned(),
+        references: vec!["db/1.jpg".to_owned(), "db/2.jpg".to_owned()],
+    };
+    let pairs = Pairs { lists: vec![list("q/1.jpg"), list("q/2.jpg")] };
+    exchange::write_pairs(Format::VprEval, &place("eval"), &pairs).unwrap();
+    seed("vpr-eval-preds", "sound", &place("eval/preds/000.txt"));
+    exchange::write_pairs(Format::HlocPairs, &place("pairs"), &pairs).unwrap();
+    seed("hloc-pairs", "sound", &place("pairs"));
+    let zone = UtmZone { number: 32, south: false };
+    let planar = vec![PlanarPosition::new(593_139.5, 5_763_197.8); 3];
+    let about = About { coordinates: Some(Coordinates::Utm(zone)), ..About::default() };
+    let planar = Parts { poses: Some(Poses::Planar(planar)), about, ..parts(3) };
+    exchange::write(Format::LatLon, &place("latlon"), &planar).unwrap();
+    seed("latlon", "sound", &place("latlon"));
+    exchange::write(Format::UtmNames, &place("utm"), &planar).unwrap();
+    seed("utm-names", "sound", &place("utm"));
+    let mut map = GrowingMap::open(&place("growing"), RowType::F32, About::default()).unwrap();
+    map.append(Array2::ones((2, 3)).view(), None, None).unwrap();
+    seed("manifest", "sound", &place("growing/manifest.json"));
+}

@@ -1,0 +1,220 @@
+//! What every chapter's command line shares. Behind the `cli` feature.
+#![expect(clippy::print_stderr, reason = "the one place that prints")]
+
+use std::{
+    io::{ErrorKind, IsTerminal, Write},
+    path::{Path, PathBuf},
+    process::ExitCode,
+    sync::Mutex,
+};
+
+use anyhow::bail;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::de::DeserializeOwned;
+
+use crate::{
+    experiment::{self, Experiment},
+    page::Report,
+    table::{Checked, Format},
+};
+use vpr_core::Observer;
+
+/// What a command concluded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// It ran, and every checked number is right. Exit code 0.
+    Success,
+    /// It ran, and a checked number is off or something checked is wrong. Exit code 1.
+    Mismatch,
+}
+
+impl Outcome {
+    /// The worse of two.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        if self == Self::Success { other } else { self }
+    }
+}
+
+/// Where an experiment finds its data.
+#[derive(Args, Clone, Debug)]
+pub struct DataArgs {
+    /// Folder of the datasets; `data/README.md` says what belongs in it
+    #[arg(long, env = "VPR_DATA", value_name = "DIR", default_value = "data", global = true)]
+    pub data: PathBuf,
+    /// Folder that keeps generated places once they are rendered
+    #[arg(
+        long,
+        env = "VPR_CACHE",
+        value_name = "DIR",
+        default_value = "data/worlds",
+        global = true
+    )]
+    pub cache: PathBuf,
+}
+
+/// How results are printed and kept.
+#[derive(Args, Clone, Debug)]
+pub struct OutputArgs {
+    /// Format on stdout
+    #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
+    pub format: Format,
+    /// Also write the page, its CSV and its figure into this folder
+    #[arg(long, value_name = "DIR")]
+    pub write: Option<PathBuf>,
+    /// Compare with the page in this folder and with the expected numbers
+    #[arg(long, value_name = "DIR", conflicts_with = "write")]
+    pub check: Option<PathBuf>,
+    /// Measure what differs from run to run (timings) as well
+    #[arg(long)]
+    pub timings: bool,
+}
+
+/// Which experiments to run, from which data, and what becomes of their results.
+#[derive(Args, Clone, Debug)]
+pub struct RunArgs {
+    /// Experiment files, such as `experiments/table-3.5.toml`; what they have in common is computed
+    /// once
+    #[arg(required = true, value_name = "FILE")]
+    pub experiments: Vec<PathBuf>,
+    /// Where their data is.
+    #[command(flatten)]
+    pub data: DataArgs,
+    /// How results are printed and kept.
+    #[command(flatten)]
+    pub output: OutputArgs,
+}
+
+impl RunArgs {
+    /// The experiments, all of them `chapter`'s.
+    ///
+    /// # Errors
+    ///
+    /// A file that is malformed or another chapter's, by its path; a data folder that is not there.
+    pub fn open<S: DeserializeOwned>(&self, chapter: &str) -> anyhow::Result<Vec<Experiment<S>>> {
+        let open = |path: &PathBuf| {
+            let experiment = experiment::load::<S>(path)?;
+            if experiment.chapter != chapter {
+                bail!("{}: belongs to `{}`", path.display(), experiment.chapter);
+            }
+            Ok(experiment)
+        };
+        let experiments = self.experiments.iter().map(open).collect::<anyhow::Result<_>>()?;
+        if !self.data.data.is_dir() {
+            bail!("{}: the data folder does not exist", self.data.data.display());
+        }
+        Ok(experiments)
+    }
+
+    /// `data/` beside the folder of the first experiment file: where the fixture lies.
+    #[must_use]
+    pub fn workspace_data(&self) -> PathBuf {
+        let first = self.experiments.first().map_or(Path::new(""), PathBuf::as_path);
+        let absolute = std::path::absolute(first).unwrap_or_else(|_| first.to_owned());
+        absolute.ancestors().nth(2).unwrap_or(Path::new("")).join("data")
+    }
+}
+
+/// Runs `body` as a program: errors to stderr, exit code 0, 1 or 2. A closed pipe is no error.
+pub fn main(body: impl FnOnce() -> anyhow::Result<Outcome>) -> ExitCode {
+    match body() {
+        Ok(Outcome::Success) => ExitCode::SUCCESS,
+        Ok(Outcome::Mismatch) => ExitCode::from(1),
+        Err(err) if is_broken_pipe(&err) => ExitCode::SUCCESS,
+        Err(err) => {
+            eprintln!("error: {err:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn is_broken_pipe(err: &anyhow::Error) -> bool {
+    err.chain().any(|cause| {
+        cause.downcast_ref::<std::io::Error>().is_some_and(|it| it.kind() == ErrorKind::BrokenPipe)
+    })
+}
+
+/// Prints data on stdout.
+///
+/// # Errors
+///
+/// If stdout is closed.
+pub fn print(text: &str) -> anyhow::Result<()> {
+    let mut stdout = std::io::stdout().lock();
+    stdout.write_all(text.as_bytes())?;
+    Ok(stdout.flush()?)
+}
+
+/// Tells a person something, on stderr.
+pub fn note(text: &str) {
+    eprintln!("{text}");
+}
+
+/// A progress bar on stderr; invisible if stderr is no terminal or `VPR_NO_PROGRESS` is set.
+#[must_use]
+pub fn progress(what: &str, n: usize) -> ProgressBar {
+    if !std::io::stderr().is_terminal() || std::env::var_os("VPR_NO_PROGRESS").is_some() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}");
+    let bar = ProgressBar::new(n as u64);
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_message(what.to_owned());
+    bar
+}
+
+/// The progress bar of the work under way, on stderr.
+#[derive(Default)]
+pub struct Bar(Mutex<Option<ProgressBar>>);
+
+impl Bar {
+    fn with(&self, act: impl FnOnce(&mut Option<ProgressBar>)) {
+        // A poisoned lock means another thread panicked: progress no longer matters.
+        if let Ok(mut bar) = self.0.lock() {
+            act(&mut bar);
+        }
+    }
+}
+
+impl Observer for Bar {
+    fn start(&self, what: &str, n: usize) {
+        self.with(|bar| *bar = Some(progress(what, n)));
+    }
+
+    fn step(&self) {
+        self.with(|bar| bar.iter().for_each(|bar| bar.inc(1)));
+    }
+
+    fn end(&self) {
+        self.with(|bar| bar.take().iter().for_each(ProgressBar::finish_and_clear));
+    }
+}
+
+/// Prints a result and, as the flags say, writes its page or checks it.
+///
+/// # Errors
+///
+/// If stdout is closed, or a page cannot be read or written.
+pub fn finish<S>(
+    experiment: &Experiment<S>,
+    report: &Report,
+    output: &OutputArgs,
+) -> anyhow::Result<Outcome> {
+    let table = &report.table;
+    print(&table.render(output.format))?;
+    if let Some(folder) = &output.write {
+        report.write(experiment, folder)?;
+    }
+    let Some(folder) = &output.check else { return Ok(Outcome::Success) };
+    let Checked { findings, n_compared, n_not_at_hand } = report.check(experiment, folder)?;
+    for finding in &findings {
+        note(&format!("{}: {finding}", table.id));
+    }
+    let rest = match n_not_at_hand {
+        0 => String::new(),
+        n => format!("; {n} cells of the page need data that is not at hand"),
+    };
+    note(&format!("{}: {n_compared} comparisons, {} off{rest}", table.id, findings.len()));
+    Ok(if findings.is_empty() { Outcome::Success } else { Outcome::Mismatch })
+}
