@@ -21,6 +21,7 @@ enum Command {
     Run(cli::RunArgs),
     /// Say how many queries find a correct reference, from two folders or two descriptor files
     Evaluate(Box<command::evaluate::EvaluateArgs>),
+    #[cfg(feature = "networks")]
     /// Describe the images of a folder with a network, and write their map
     Encode(Box<command::encode::EncodeArgs>),
     /// List what there is
@@ -29,6 +30,7 @@ enum Command {
     Map(command::map::MapArgs),
     /// Match two images by local features: keypoints, matches, inliers, a picture
     Match(Box<command::match_images::MatchArgs>),
+    #[cfg(feature = "networks")]
     /// Say which networks there are and where their weights are from
     Methods(command::methods::MethodsArgs),
     /// Say everything that is wrong with a dataset folder
@@ -39,10 +41,12 @@ fn main() -> ExitCode {
     cli::main(|| match Cli::parse().command {
         Command::Run(args) => command::run::run(&args),
         Command::Evaluate(args) => command::evaluate::run(&args),
+        #[cfg(feature = "networks")]
         Command::Encode(args) => command::encode::run(&args),
         Command::List(args) => command::list::run(&args),
         Command::Map(args) => command::map::run(&args),
         Command::Match(args) => command::match_images::run(&args),
+        #[cfg(feature = "networks")]
         Command::Methods(args) => command::methods::run(&args),
         Command::Validate(args) => command::validate::run(&args),
     })

@@ -12,6 +12,7 @@ pub enum Error {
     #[error(transparent)]
     Core(#[from] vpr_core::Error),
     /// Weights or networks.
+    #[cfg(feature = "study")]
     #[error(transparent)]
     Nets(#[from] vpr_nets::Error),
     /// An estimator needs more neighbours than were retrieved or than there are.

@@ -26,13 +26,16 @@
 
 pub mod calibrate;
 mod choice;
+#[cfg(feature = "study")]
 pub mod corpus;
 mod decision;
 mod error;
 mod estimator;
 mod evidence;
 pub mod fusion;
+#[cfg(feature = "study")]
 pub mod net;
+#[cfg(feature = "study")]
 pub mod study;
 
 pub use choice::{EstimatorChoice, EstimatorSettings, Prepared};

@@ -6,19 +6,21 @@ use anyhow::{Context, bail, ensure};
 use vpr_core::{
     Descriptors, GroundTruth, Observer as _, Ranking,
     metrics::{Positives, auc_pr, recall_at},
-    retrieve,
 };
 use vpr_data::layout::vpr_bench::GroundTruthFile;
 use vpr_files::npy;
-use vpr_nets::encode::{Encoder, Options, encode_files};
 use vpr_report::cli::{self, Bar, DataArgs, Outcome};
 use vpr_study::{Runner, Sources, technique::hand_crafted};
 
+#[cfg(feature = "networks")]
 use super::{
+    by_network::{self, Asked},
     encoder::EncoderArgs,
+};
+use super::{
     named::Named,
     predictions::{self, Saving},
-    retrieved::Retrieved,
+    retrieved::{Retrieved, nearest},
 };
 
 /// The flags of VPR-methods-evaluation, in kebab case; the names with underscores work too.
@@ -41,6 +43,7 @@ pub(crate) struct EvaluateArgs {
     /// Technique that describes the images: hog, hog-thesis, cohog, or a network of `bench methods`
     #[arg(long, default_value = "hog", value_name = "NAME")]
     method: String,
+    #[cfg(feature = "networks")]
     #[command(flatten)]
     encoder: EncoderArgs,
     #[command(flatten)]
@@ -197,7 +200,22 @@ fn match_images(
     k: usize,
 ) -> anyhow::Result<Retrieved> {
     let Some(Runner { technique, .. }) = hand_crafted(&args.method) else {
-        return by_network(args, queries, references, k);
+        #[cfg(feature = "networks")]
+        {
+            let asked = Asked {
+                method: &args.method,
+                encoder: &args.encoder,
+                data: &args.data.data,
+                threads: args.num_workers,
+            };
+            return by_network::retrieve(&asked, queries, references, k);
+        }
+        #[cfg(not(feature = "networks"))]
+        bail!(
+            "`{}` is no technique without a network, and this program was built without networks: \
+             add `--features bench/networks` to cargo's flags",
+            args.method
+        );
     };
     let bar = Bar::default();
     let n = queries.names.len() + references.names.len();
@@ -210,66 +228,6 @@ fn match_images(
     let ranking = matched.similarities.ranked(k)?;
     let descriptors = query_features.into_descriptors().zip(reference_features.into_descriptors());
     let confidence = matched.similarities.best().confidence;
-    Ok(Retrieved::new([queries, references], ranking, confidence, descriptors))
-}
-
-/// Describes images by a network and retrieves by Euclidean distance.
-fn by_network(
-    args: &EvaluateArgs,
-    queries: Named,
-    references: Named,
-    k: usize,
-) -> anyhow::Result<Retrieved> {
-    let encoder = args.encoder.open(&args.method, &args.data.data)?;
-    let options = args.encoder.options(args.num_workers, false);
-    let [query_rows, reference_rows] = encode(&*encoder, [&queries, &references], &options)?;
-    let alone = if encoder.batch_dependent() && options.batch_size > 1 {
-        cli::note(&format!(
-            "descriptors of `{}` depend on their batch: images are described one by one as well",
-            encoder.name()
-        ));
-        let options = Options { batch_size: 1, ..options };
-        let [query_rows, reference_rows] = encode(&*encoder, [&queries, &references], &options)?;
-        let retrieval = retrieve(&query_rows, &reference_rows, k)?;
-        Some(AsRef::<Ranking>::as_ref(&retrieval).clone())
-    } else {
-        None
-    };
-    let retrieved = nearest(queries, references, query_rows, reference_rows, k)?;
-    Ok(Retrieved { alone, ..retrieved })
-}
-
-/// Descriptors of two sets of images.
-fn encode(
-    encoder: &dyn Encoder,
-    sets: [&Named; 2],
-    options: &Options,
-) -> anyhow::Result<[Descriptors; 2]> {
-    let bar = cli::progress(encoder.name(), sets.iter().map(|set| set.names.len()).sum());
-    let each = |paths: &[PathBuf], before: usize| {
-        encode_files(encoder, paths, options, &mut |done| {
-            bar.set_position((before + done) as u64);
-        })
-    };
-    let queries = each(&sets[0].names, 0)?;
-    let references = each(&sets[1].names, sets[0].names.len())?;
-    bar.finish_and_clear();
-    Ok([queries, references])
-}
-
-/// The nearest references by Euclidean distance.
-fn nearest(
-    queries: Named,
-    references: Named,
-    query_rows: Descriptors,
-    reference_rows: Descriptors,
-    k: usize,
-) -> anyhow::Result<Retrieved> {
-    let retrieval = retrieve(&query_rows, &reference_rows, k)?;
-    let confidence =
-        (0..retrieval.len()).map(|query| -f64::from(retrieval.distances(query)[0])).collect();
-    let ranking = AsRef::<Ranking>::as_ref(&retrieval).clone();
-    let descriptors = Some((query_rows, reference_rows));
     Ok(Retrieved::new([queries, references], ranking, confidence, descriptors))
 }
 

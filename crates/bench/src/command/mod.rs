@@ -1,12 +1,17 @@
 //! The subcommands: each parses, calls the library and prints.
 
+#[cfg(feature = "networks")]
+mod by_network;
+#[cfg(feature = "networks")]
 pub(crate) mod encode;
+#[cfg(feature = "networks")]
 mod encoder;
 pub(crate) mod evaluate;
 pub(crate) mod list;
 mod log_folder;
 pub(crate) mod map;
 pub(crate) mod match_images;
+#[cfg(feature = "networks")]
 pub(crate) mod methods;
 mod named;
 pub(crate) mod predictions;

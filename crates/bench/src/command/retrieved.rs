@@ -1,6 +1,6 @@
 //! What was retrieved for two sets of images or rows.
 
-use vpr_core::{Descriptors, GroundTruth, Ranking};
+use vpr_core::{Descriptors, GroundTruth, Ranking, retrieve};
 
 use super::named::Named;
 
@@ -30,4 +30,20 @@ impl Retrieved {
         let (alone, truth) = (None, None);
         Self { queries, references, ranking, alone, confidence, descriptors, truth }
     }
+}
+
+/// The nearest references by Euclidean distance.
+pub(super) fn nearest(
+    queries: Named,
+    references: Named,
+    query_rows: Descriptors,
+    reference_rows: Descriptors,
+    k: usize,
+) -> anyhow::Result<Retrieved> {
+    let retrieval = retrieve(&query_rows, &reference_rows, k)?;
+    let confidence =
+        (0..retrieval.len()).map(|query| -f64::from(retrieval.distances(query)[0])).collect();
+    let ranking = AsRef::<Ranking>::as_ref(&retrieval).clone();
+    let descriptors = Some((query_rows, reference_rows));
+    Ok(Retrieved::new([queries, references], ranking, confidence, descriptors))
 }

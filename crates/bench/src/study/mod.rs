@@ -21,20 +21,17 @@ mod worlds;
 use std::sync::Arc;
 
 use serde::Deserialize;
-use vpr_core::{Observer, Provenance, Result};
+use vpr_core::{Provenance, Result};
 use vpr_data::Dataset;
 use vpr_report::{
     experiment::Experiment,
     figure::{Figure, Panel},
     page::Report,
-    table::Table,
 };
 
 pub use invariance::Stage;
-pub use vpr_study::Dial;
-use vpr_study::Sources;
-
 pub use platform_speed::TechniqueTiming;
+use vpr_study::Sources;
 pub use worlds::{Domain, Likeness, Worlds};
 
 /// What to compute; the key `kind` of `[study]` chooses.

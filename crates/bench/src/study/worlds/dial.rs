@@ -1,6 +1,6 @@
 //! Nuisance dials: recall@1 as numbers of a recipe rise.
 
-use vpr_core::{Error, Provenance, Result, metrics::bootstrap::Interval};
+use vpr_core::{Provenance, Result, metrics::bootstrap::Interval};
 use vpr_report::{
     figure::{Curve, Figure, Panel},
     table::{Cell, Table},
