@@ -125,7 +125,9 @@ pub(super) fn orthogonal_complement<const N: usize, const M: usize>(
             continue;
         }
         let scale = 1.0 / squared.sqrt();
-        mirror.iter_mut().for_each(|it| *it *= scale);
+        for it in mirror.iter_mut() {
+            *it *= scale;
+        }
         rows[k + 1..].iter_mut().for_each(|row| reflect(row, &mirrors[k]));
     }
     let mut basis = [[0.0; 9]; M];

@@ -3,6 +3,9 @@
 //! Samples depend on the seed alone, and their number not on what is found unless asked for. The model of a sample that
 //! explains most is replaced by that of all its inliers where it explains no fewer.
 
+#![expect(clippy::many_single_char_names, reason = "coordinates and entries of matrices")]
+#![expect(clippy::inline_always, reason = "what is inlined uses the caller's instruction set")]
+
 mod algebra;
 mod essential;
 mod fundamental;

@@ -212,3 +212,14 @@ fn five_exact_points_give_the_essential_matrix_among_others() {
         assert!(nearest < 1e-8, "{nearest} of {}", models.len());
     }
 }
+
+#[test]
+fn points_that_coincide_or_are_on_a_line_are_no_plane() {
+    let point = |query, reference| Correspondence { query, reference };
+    let same = vec![point([5.0, 5.0], [9.0, 9.0]); 20];
+    let line: Vec<_> = (0..20).map(|i| point([f64::from(i), 0.0], [0.0, f64::from(i)])).collect();
+    for points in [same, line] {
+        let found = homography(&points, &RansacParams::HOMOGRAPHY).unwrap();
+        assert_eq!((found.count(), found.model), (0, None));
+    }
+}
