@@ -65,9 +65,9 @@ fn root_between(
             break;
         }
         if (here > 0.0) == rises {
-            high = at
+            high = at;
         } else {
-            low = at
+            low = at;
         }
         let newton = at - here / (scale * value(slope, at));
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };

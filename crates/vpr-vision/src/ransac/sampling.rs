@@ -1,5 +1,7 @@
 //! Which samples are drawn.
 
+#![expect(clippy::cast_possible_truncation, reason = "sizes of samples, halves of products")]
+
 use rand_chacha::{
     ChaCha8Rng,
     rand_core::{Rng, SeedableRng},

@@ -1,5 +1,12 @@
 //! The loop: samples, models, and which explains most.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    reason = "sizes of samples and blocks; a number of samples, above 0, saturates"
+)]
+
 use pulp::{Arch, Simd, WithSimd};
 use vpr_core::Result;
 
