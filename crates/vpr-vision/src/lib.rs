@@ -27,4 +27,4 @@ pub mod sift;
 /// Version of the numbers: raised when a feature, matcher or estimator gives other bits for the
 /// same input. Whoever keeps results keeps it with them, so that they are not taken for another
 /// version's.
-pub const NUMERICS: u32 = 2;
+pub const NUMERICS: u32 = 3;

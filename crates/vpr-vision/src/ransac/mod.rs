@@ -1,24 +1,28 @@
 //! Geometric verification: how many matches one geometry explains, by RANSAC.
 //!
-//! Solvers, residuals and the loop are kornia-3d's. Here are the rule that samples must pass, a number of iterations
-//! that does not depend on what is found unless asked for, and draws that depend on the seed alone.
+//! Samples depend on the seed alone, and their number not on what is found unless asked for. The model of a sample that
+//! explains most is replaced by that of all its inliers where it explains no fewer.
 
+#![expect(clippy::many_single_char_names, reason = "coordinates and entries of matrices")]
+#![expect(clippy::inline_always, reason = "what is inlined uses the caller's instruction set")]
+
+mod algebra;
+mod essential;
+mod fundamental;
+mod homography;
+mod polynomial;
 mod sampling;
+mod search;
 
-use kornia_3d::{
-    pose::homography_dlt,
-    ransac::{
-        Estimator, Match2d2d, RansacConfig,
-        estimators::{EssentialEstimator, FundamentalEstimator, HomographyEstimator},
-        run,
-    },
-};
-use kornia_algebra::{Mat3F64, Vec2F64};
-use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use serde::{Deserialize, Serialize};
 use vpr_core::{Error, Result};
 
-use self::sampling::{Count, Draws};
+use self::{
+    essential::Essential,
+    fundamental::Fundamental,
+    homography::Homography,
+    search::{Geometry, search},
+};
 use crate::{features::LocalFeatures, matching::Match};
 
 /// Where a point of the query image is seen in the reference image: (x, y) in pixels of each.
@@ -153,25 +157,23 @@ impl Intrinsics {
 /// [`Error::Parameter`] if a parameter is out of range or a coordinate beyond 1e9, [`Error::NotFinite`] if one is NaN or
 /// infinite. Too few or degenerate correspondences are no error: they give no model and no inlier.
 pub fn homography(points: &[Correspondence], params: &RansacParams) -> Result<Inliers> {
-    let samples = samples(points, |it| it, |it| it)?;
-    if samples.len() == HomographyEstimator::SAMPLE_SIZE {
+    let points = checked(points, |it| it, |it| it)?;
+    if points.len() == Homography::SAMPLE {
         params.check()?;
-        return Ok(of_four(&samples, params.threshold));
+        return Ok(of_four(&points, params.threshold));
     }
-    search(&HomographyEstimator, &samples, params, params.threshold, Some(sampling::is_fair_quad))
+    search::<Homography>(&points, params, params.threshold)
 }
 
 /// The mapping of four correspondences, which may coincide, and those that it explains.
-fn of_four(samples: &[Match2d2d], threshold: f64) -> Inliers {
-    let [from, to] = [|it: &Match2d2d| it.x1, |it: &Match2d2d| it.x2]
-        .map(|side| samples.iter().map(side).collect::<Vec<_>>());
-    let model = homography_dlt(&from, &to).ok();
-    let is_inlier = |it: &Match2d2d| {
-        let off = model.map(|model| HomographyEstimator.residual(&model, it));
-        off.is_some_and(|off| off < threshold * threshold)
+fn of_four(points: &[Correspondence], threshold: f64) -> Inliers {
+    let model = homography::nearest(points);
+    let below = threshold * threshold;
+    let mask = match &model {
+        Some(model) => search::mask::<Homography>(model, points, below),
+        None => vec![false; points.len()],
     };
-    let mask = samples.iter().map(is_inlier).collect();
-    Inliers { model: model.map(rows), mask, iterations: 1 }
+    Inliers { model, mask, iterations: 1 }
 }
 
 /// Inliers of the epipolar geometry of two uncalibrated images; needs 8 correspondences.
@@ -180,8 +182,8 @@ fn of_four(samples: &[Match2d2d], threshold: f64) -> Inliers {
 ///
 /// As [`homography`].
 pub fn fundamental(points: &[Correspondence], params: &RansacParams) -> Result<Inliers> {
-    let samples = samples(points, |it| it, |it| it)?;
-    search(&FundamentalEstimator, &samples, params, params.threshold, None)
+    let points = checked(points, |it| it, |it| it)?;
+    search::<Fundamental>(&points, params, params.threshold)
 }
 
 /// Inliers of the epipolar geometry of two calibrated images, by the five-point method; needs 5 correspondences.
@@ -199,20 +201,19 @@ pub fn essential(
 ) -> Result<Inliers> {
     cameras.iter().try_for_each(Intrinsics::check)?;
     let [query, reference] = cameras;
-    let samples = samples(points, |it| query.normalize(it), |it| reference.normalize(it))?;
+    let points = checked(points, |it| query.normalize(it), |it| reference.normalize(it))?;
     let focal = 0.5 * (query.mean_focal() + reference.mean_focal());
-    search(&EssentialEstimator, &samples, params, params.threshold / focal, None)
+    search::<Essential>(&points, params, params.threshold / focal)
 }
 
 /// Coordinates beyond this are no pixels, and their squares would not be finite in every solver.
 const FARTHEST: f64 = 1e9;
 
-fn samples(
+fn checked(
     points: &[Correspondence],
     query: impl Fn([f64; 2]) -> [f64; 2],
     reference: impl Fn([f64; 2]) -> [f64; 2],
-) -> Result<Vec<Match2d2d>> {
-    let vector = |[x, y]: [f64; 2]| Vec2F64::new(x, y);
+) -> Result<Vec<Correspondence>> {
     let of = |(row, it): (usize, &Correspondence)| {
         let given = [it.query, it.reference];
         let used = [query(it.query), reference(it.reference)];
@@ -225,45 +226,9 @@ fn samples(
             let reason = "coordinates must be within 1e9, of normalised images too";
             return Err(Error::Parameter { name: "correspondences", value, reason });
         }
-        Ok(Match2d2d::new(vector(used[0]), vector(used[1])))
+        Ok(Correspondence { query: used[0], reference: used[1] })
     };
     points.iter().enumerate().map(of).collect()
-}
-
-fn search<E>(
-    estimator: &E,
-    samples: &[Match2d2d],
-    params: &RansacParams,
-    threshold: f64,
-    fair: Option<sampling::Rule>,
-) -> Result<Inliers>
-where
-    E: Estimator<Model = Mat3F64, Sample = Match2d2d>,
-{
-    params.check()?;
-    let rng = ChaCha8Rng::seed_from_u64(params.seed);
-    let mut draws = Draws::new(rng, samples, fair);
-    let consensus = Count { below: threshold * threshold, adaptive: params.confidence.is_some() };
-    let config = RansacConfig {
-        max_iters: params.iterations,
-        confidence: params.confidence.unwrap_or(1.0),
-        inlier_threshold: consensus.below,
-        ..RansacConfig::default()
-    };
-    let found = run(estimator, &consensus, &mut draws, samples, &config);
-    let enough = found.inliers.iter().filter(|&&inlier| inlier).count() >= E::SAMPLE_SIZE;
-    let model = found
-        .model
-        .filter(|_| enough)
-        .map(rows)
-        .filter(|rows| rows.as_flattened().iter().all(|it| it.is_finite()));
-    let mask = if model.is_some() { found.inliers } else { vec![false; samples.len()] };
-    Ok(Inliers { model, mask, iterations: found.num_iters })
-}
-
-fn rows(matrix: Mat3F64) -> [[f64; 3]; 3] {
-    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
-    [[x.x, y.x, z.x], [x.y, y.y, z.y], [x.z, y.z, z.z]]
 }
 
 #[cfg(test)]

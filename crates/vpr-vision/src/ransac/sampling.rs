@@ -1,79 +1,70 @@
-//! Which samples are drawn and how models are scored.
+//! Which samples are drawn.
 
-use kornia_3d::ransac::{Consensus, ConsensusOutcome, Match2d2d, Sampler, UniformSampler};
-use kornia_algebra::Vec2F64;
-use rand_chacha::ChaCha8Rng;
+#![expect(clippy::cast_possible_truncation, reason = "sizes of samples, halves of products")]
 
-/// Whether a sample can be one of inliers.
-pub(super) type Rule = fn(&[Match2d2d], &[usize]) -> bool;
+use rand_chacha::{
+    ChaCha8Rng,
+    rand_core::{Rng, SeedableRng},
+};
+
+use super::{Correspondence, search::Geometry};
 
 /// A sample is drawn again at most so often; then it is taken as it is.
 const ATTEMPTS: usize = 100;
 
-/// Distinct indices that obey a rule.
+/// Samples of distinct correspondences that a geometry finds fair, all equally likely.
 pub(super) struct Draws<'a> {
-    uniform: UniformSampler<ChaCha8Rng>,
-    samples: &'a [Match2d2d],
-    rule: Option<Rule>,
+    rng: ChaCha8Rng,
+    points: &'a [Correspondence],
+    indices: Vec<u32>,
+    sample: Vec<Correspondence>,
 }
 
 impl<'a> Draws<'a> {
-    pub(super) fn new(rng: ChaCha8Rng, samples: &'a [Match2d2d], rule: Option<Rule>) -> Self {
-        Self { uniform: UniformSampler::new(rng), samples, rule }
+    pub(super) fn new(seed: u64, points: &'a [Correspondence]) -> Self {
+        let rng = ChaCha8Rng::seed_from_u64(seed);
+        Self { rng, points, indices: Vec::new(), sample: Vec::new() }
     }
-}
 
-impl Sampler for Draws<'_> {
-    fn sample(&mut self, n: usize, out: &mut [usize]) {
+    /// The next sample. There must be at least as many correspondences as it has.
+    pub(super) fn next<G: Geometry>(&mut self) -> &[Correspondence] {
         for _ in 0..ATTEMPTS {
-            self.uniform.sample(n, out);
-            if self.rule.is_none_or(|rule| rule(self.samples, out)) {
-                return;
+            self.draw(G::SAMPLE);
+            self.sample.clear();
+            self.sample.extend(self.indices.iter().map(|&at| self.points[at as usize]));
+            if G::is_fair(&self.sample) {
+                break;
             }
         }
+        &self.sample
     }
-}
 
-/// The number of residuals below a bound.
-pub(super) struct Count {
-    /// Squared threshold, as kornia's residuals are squared.
-    pub(super) below: f64,
-    /// Whether the loop may end early.
-    pub(super) adaptive: bool,
-}
-
-impl Consensus for Count {
-    fn consensus(&self, residuals: &[f64], inliers: &mut Vec<bool>) -> ConsensusOutcome {
-        inliers.clear();
-        inliers.extend(residuals.iter().map(|&residual| residual < self.below));
-        let count = inliers.iter().filter(|&&inlier| inlier).count();
-        // The loop shortens itself by `inlier_count`, and not at all if that is zero.
-        let inlier_count = if self.adaptive { count } else { 0 };
-        ConsensusOutcome { score: count as f64, inlier_count }
-    }
-}
-
-/// Whether four correspondences can belong to a homography: no three points on a line in either image, and every
-/// triangle keeps its orientation, or every one changes it.
-pub(super) fn is_fair_quad(samples: &[Match2d2d], indices: &[usize]) -> bool {
-    const TRIANGLES: [[usize; 3]; 4] = [[0, 1, 2], [1, 2, 3], [0, 2, 3], [0, 1, 3]];
-    let &[a, b, c, d] = indices else { return true };
-    let quad = [samples[a], samples[b], samples[c], samples[d]];
-    let mut turned = 0;
-    for triangle in TRIANGLES {
-        let before = area(triangle.map(|corner| quad[corner].x1));
-        let after = area(triangle.map(|corner| quad[corner].x2));
-        if before.abs() < FLAT || after.abs() < FLAT {
-            return false;
+    /// Floyd's algorithm (Bentley & Floyd 1987), in the order of draws of the crate `rand` 0.10.
+    fn draw(&mut self, size: usize) {
+        let n = u32::try_from(self.points.len()).unwrap_or(u32::MAX);
+        self.indices.clear();
+        for last in n - size as u32..n {
+            let drawn = self.at_most(last);
+            if let Some(twice) = self.indices.iter().position(|&it| it == drawn) {
+                self.indices[twice] = last;
+            }
+            self.indices.push(drawn);
         }
-        turned += usize::from(before * after < 0.0);
     }
-    turned == 0 || turned == TRIANGLES.len()
-}
 
-/// Triangles of less area, in square pixels, are flat.
-const FLAT: f64 = 1e-3;
-
-fn area([a, b, c]: [Vec2F64; 3]) -> f64 {
-    0.5 * ((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x))
+    /// A number from 0 to `last`: the high half of a product, with a second draw where the low half shows a bias
+    /// (Canon's method).
+    fn at_most(&mut self, last: u32) -> u32 {
+        let range = last.wrapping_add(1);
+        if range == 0 {
+            return self.rng.next_u32();
+        }
+        let mut multiply = || {
+            let product = u64::from(self.rng.next_u32()) * u64::from(range);
+            ((product >> 32) as u32, product as u32)
+        };
+        let (high, low) = multiply();
+        let carries = low > range.wrapping_neg() && low.checked_add(multiply().0).is_none();
+        high + u32::from(carries)
+    }
 }

@@ -163,3 +163,63 @@ fn wrong_numbers_are_named() {
     let flat = Intrinsics { focal: [0.0, 1.0], ..CAMERA };
     assert!(essential(&[], [CAMERA, flat], &RansacParams::EPIPOLAR).is_err());
 }
+
+#[test]
+fn exact_planes_are_recovered_among_three_outliers_in_five() {
+    for seed in 0..20 {
+        let mut noise = Noise(seed);
+        let of = |index| {
+            let query = noise.pixel();
+            let reference = if index % 5 < 2 { map(&TRUE_H, query) } else { noise.pixel() };
+            Correspondence { query, reference }
+        };
+        let points: Vec<_> = (0..200).map(of).collect();
+        let params = RansacParams { seed, threshold: 0.1, ..RansacParams::HOMOGRAPHY };
+        let found = homography(&points, &params).unwrap();
+        assert!(points.iter().zip(&found.mask).step_by(5).all(|(_, &inlier)| inlier));
+        let model = found.model.unwrap();
+        for (ours, exact) in model.as_flattened().iter().zip(TRUE_H.as_flattened()) {
+            assert!((ours - exact).abs() < 1e-3 * exact.abs().max(1e-3), "{seed}: {model:?}");
+        }
+        assert_eq!(homography(&points, &params).unwrap(), found);
+    }
+}
+
+/// The unit vector of nine entries, up to its sign.
+fn apart(ours: &[[f64; 3]; 3], exact: &[[f64; 3]; 3]) -> f64 {
+    let pairs = || ours.as_flattened().iter().zip(exact.as_flattened());
+    let dot: f64 = pairs().map(|(a, b)| a * b).sum();
+    let (a, b): (f64, f64) = (pairs().map(|(a, _)| a * a).sum(), pairs().map(|(_, b)| b * b).sum());
+    1.0 - dot.abs() / (a * b).sqrt()
+}
+
+#[test]
+fn five_exact_points_give_the_essential_matrix_among_others() {
+    let (sin, cos) = 0.1_f64.sin_cos();
+    // [t]ₓ R of `scene`, t = (1, 0, 0.2).
+    let exact = [[0.0, -0.2, 0.0], [0.2 * cos - sin, 0.0, -0.2 * sin - cos], [0.0, 1.0, 0.0]];
+    let points: Vec<_> = scene(100, 0)
+        .iter()
+        .map(|it| Correspondence {
+            query: CAMERA.normalize(it.query),
+            reference: CAMERA.normalize(it.reference),
+        })
+        .collect();
+    for sample in points.chunks_exact(5) {
+        let mut models = Vec::new();
+        Essential::fit(sample, &mut models);
+        let nearest = models.iter().map(|it| apart(it, &exact)).fold(1.0, f64::min);
+        assert!(nearest < 1e-8, "{nearest} of {}", models.len());
+    }
+}
+
+#[test]
+fn points_that_coincide_or_are_on_a_line_are_no_plane() {
+    let point = |query, reference| Correspondence { query, reference };
+    let same = vec![point([5.0, 5.0], [9.0, 9.0]); 20];
+    let line: Vec<_> = (0..20).map(|i| point([f64::from(i), 0.0], [0.0, f64::from(i)])).collect();
+    for points in [same, line] {
+        let found = homography(&points, &RansacParams::HOMOGRAPHY).unwrap();
+        assert_eq!((found.count(), found.model), (0, None));
+    }
+}
