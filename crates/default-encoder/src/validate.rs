@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use default_encoder::pixels::planes;
 use ndarray::Array2;
 use rayon::prelude::*;
 use vpr_core::{
@@ -15,7 +14,10 @@ use vpr_core::{
     retrieve,
 };
 use vpr_data::{DataRoots, Dataset, Datasets};
-use vpr_nets::model::default::{DefaultEncoder, DefaultEncoderConfig, INPUT};
+use vpr_nets::{
+    model::default::{DefaultEncoder, DefaultEncoderConfig, INPUT},
+    train::planes,
+};
 use vpr_report::cli::{self, Outcome};
 use vpr_vision::{
     hog::{Hog, HogParams},

@@ -2,6 +2,8 @@
 
 use std::{fmt, path::PathBuf};
 
+use crate::train::{Difference, listed};
+
 /// The result of every fallible function here.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -19,6 +21,14 @@ pub enum Error {
         path: PathBuf,
         /// What does not fit.
         mismatch: Box<Mismatch>,
+    },
+    /// The folder of a training run is that of a run with other settings.
+    #[error("{}", listed(folder, differences))]
+    OtherRun {
+        /// The folder.
+        folder: PathBuf,
+        /// Every setting that differs.
+        differences: Vec<Difference>,
     },
     /// A pattern of a key is not a regular expression.
     #[error("key pattern `{pattern}`: {reason}")]
@@ -41,6 +51,10 @@ impl From<Error> for vpr_core::Error {
         match err {
             Error::Core(err) => err,
             Error::Weights { path, mismatch } => Self::format(path, "keys", mismatch.to_string()),
+            Error::OtherRun { folder, differences } => {
+                let lines: String = differences.iter().map(|it| format!("\n{it}")).collect();
+                Self::format(folder, "settings", format!("those of another run:{lines}"))
+            }
             Error::Pattern { pattern, reason } => {
                 Self::format("key pattern", format!("`{pattern}`"), reason)
             }

@@ -7,7 +7,7 @@ use burn::tensor::activation::gelu;
 use burn::tensor::{Device, Tensor};
 
 use crate::Result;
-use crate::infer::Shapes;
+use crate::weights::Shapes;
 use crate::weights::Weights;
 
 /// Values of a relative pose: tx, ty, tz, qw, qx, qy, qz.

@@ -49,7 +49,7 @@ fn main() -> Result<()> {
     let sweeps = [over_references()?, over_dimensions()?, over_queries()?];
     let mut page = format!(
         "Exact search, Euclidean, k = 10, uniform random values, {} threads; milliseconds, least of \
-         several runs. Written by `cargo run -p vpr-core --features cli --example search_scaling -- \
+         several runs. Written by `cargo run --example search_scaling -- \
          docs/results`. The slope of the logarithms is 1 where cost is proportional.\n",
         rayon::current_num_threads()
     );

@@ -34,6 +34,7 @@
 
 mod camera;
 mod catalog;
+pub mod cities;
 mod condition;
 mod family;
 mod film;

@@ -1,28 +1,23 @@
 //! `sue train`: networks that say how sure they are, on generated street cities.
 
-use std::{
-    fs::{self, OpenOptions},
-    io::Write as _,
-    path::{Path, PathBuf},
-};
+use std::path::PathBuf;
 
-use anyhow::{Context as _, bail};
+use anyhow::bail;
 use clap::ValueEnum;
-use default_encoder::{
-    batches::{Sizes, batch},
-    cities::{self, VISITS},
-};
 use sue::net::{self, Learned, Lesson, Training};
-use vpr_core::Error;
 use vpr_nets::{
     loss::{LogVariance, SelfTeaching},
     model::default::{DefaultEncoderConfig, INPUT},
-    train::{Checkpoint, Report},
+    train::{Album, Arrangement, Batches, Report, Run, Sizes},
+    weights::{Precision, Weights, save},
 };
 use vpr_report::cli::{self, Outcome};
+use vpr_worlds::cities::{self, AVENUES, PLACES, VISITS};
 
-/// First line of a log.
-const HEAD: &str = "step,loss,rate\n";
+/// How the images of a city lie.
+const CITY: Arrangement = Arrangement { places: PLACES, visits: VISITS, avenues: AVENUES };
+/// Steps between two lines on the screen.
+const SHOWN: usize = 25;
 
 /// What to train, on how much.
 #[derive(clap::Args)]
@@ -91,9 +86,8 @@ enum Teaching {
 
 impl TrainArgs {
     fn check(&self) -> anyhow::Result<()> {
-        if self.places == 0 || !self.places.is_multiple_of(4) {
-            bail!("--places {}: must be a multiple of 4", self.places);
-        }
+        self.sizes().check(CITY)?;
+        // A place that is seen once has no pair.
         if !(2..=VISITS).contains(&self.views) {
             bail!("--views {}: must be 2 to {VISITS}", self.views);
         }
@@ -101,6 +95,10 @@ impl TrainArgs {
             bail!("--cities and --steps must be at least 1");
         }
         Ok(())
+    }
+
+    fn sizes(&self) -> Sizes {
+        Sizes { input: INPUT, places: self.places, views: self.views }
     }
 
     fn rate(&self) -> f64 {
@@ -123,8 +121,8 @@ impl TrainArgs {
         }
     }
 
-    /// Everything that two runs must share to be one.
-    fn facts(&self) -> Vec<(&'static str, String)> {
+    /// Everything that two runs must share to be one; `digest` is that of the weights in `from`.
+    fn facts(&self, digest: &str) -> Vec<(&'static str, String)> {
         let mut facts = vec![
             ("network", format!("{} on the default network", self.learned.name())),
             ("trained_on", format!("{} generated street cities", self.cities)),
@@ -133,6 +131,7 @@ impl TrainArgs {
             ("batch", format!("{} places x {} images", self.places, self.views)),
             ("rate", self.rate().to_string()),
             ("input", format!("{} x {}, RGB in 0 to 1", INPUT.0, INPUT.1)),
+            ("from", format!("sha256 {digest}")),
             ("licence", "MIT OR Apache-2.0".to_owned()),
         ];
         if self.learned == Learned::Stun {
@@ -159,111 +158,39 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<Outcome> {
         );
     }
     let encoder = net::default_network(&config, &args.from)?;
-    let albums = cities::open(args.cities, args.seed, &args.cache)?;
+    let facts = args.facts(Weights::open(&args.from)?.digest());
+    let cities = cities::open(args.cities, args.seed, &args.cache, &cli::Bar::default())?;
     if args.render_only {
         return Ok(Outcome::Success);
     }
-    claim(&checkpoints, &args.facts())?;
+    let albums: Vec<Album> = cities
+        .into_iter()
+        .map(|bytes| Album::new(bytes, cities::SIZE))
+        .collect::<vpr_core::Result<_>>()?;
+    let batches = Batches::new(albums, CITY, args.sizes(), args.seed)?;
+    let batch = |step| Ok(batches.get(step));
+    let log = Training::log(&output.with_extension("log.csv"));
+    let mut run = Run::open(&checkpoints, &facts, log)?;
     let training = Training { config, steps: args.steps, rate: args.rate(), seed: args.seed };
-    let sizes = Sizes { input: INPUT, places: args.places, views: args.views };
-    let batch = |step| Ok(batch(&albums, sizes, args.seed, step));
-    let mut log = Log::open(output.with_extension("log.csv"))?;
-    let observe = |report: &Report| log.note(report);
-    let checkpoint = Checkpoint::new(&checkpoints);
     match args.learned {
         Learned::Btl => {
-            let network = training.btl(encoder, &checkpoint, batch, observe)?;
-            net::save(&network, &output, &args.facts())?;
+            let network = training.btl(encoder, &mut run, batch, show)?;
+            save(&network, &output, &facts, Precision::Half)?;
         }
         Learned::Stun => {
-            let pair = training.stun(&encoder, args.lesson(), &checkpoint, batch, observe)?;
-            net::save(pair.student(), &output, &args.facts())?;
+            let pair = training.stun(&encoder, args.lesson(), &mut run, batch, show)?;
+            save(pair.student(), &output, &facts, Precision::Half)?;
         }
     }
     cli::note(&format!("generated: {}", output.display()));
     Ok(Outcome::Success)
 }
 
-/// Makes the folder this run's, or refuses one of a run with other settings.
-fn claim(checkpoints: &Path, facts: &[(&str, String)]) -> anyhow::Result<()> {
-    let path = checkpoints.join("run.txt");
-    let lines: Vec<String> = facts.iter().map(|(key, value)| format!("{key}: {value}")).collect();
-    let text = lines.join("\n") + "\n";
-    match fs::read_to_string(&path) {
-        Ok(found) if found == text => Ok(()),
-        Ok(_) => bail!("{}: checkpoints of a run with other settings", checkpoints.display()),
-        Err(_) => {
-            fs::create_dir_all(checkpoints).with_context(|| checkpoints.display().to_string())?;
-            fs::write(&path, text).with_context(|| path.display().to_string())
-        }
+/// Some steps on the screen; all of them are in the log.
+#[expect(clippy::unnecessary_wraps, reason = "what training calls")]
+fn show(report: &Report) -> vpr_core::Result<()> {
+    if report.step % SHOWN == 1 {
+        cli::note(&format!("{},{:.5},{:.3e}", report.step, report.loss, report.rate));
     }
-}
-
-/// A line per step; a resumed run takes back the lines that it will write again.
-struct Log {
-    path: PathBuf,
-    begun: bool,
-    last: usize,
-}
-
-impl Log {
-    /// Steps between two lines on the screen.
-    const SHOWN: usize = 25;
-
-    fn open(path: PathBuf) -> anyhow::Result<Self> {
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-        }
-        Ok(Self { path, begun: false, last: 0 })
-    }
-
-    fn note(&mut self, report: &Report) -> vpr_core::Result<()> {
-        if !self.begun {
-            let kept = kept(&fs::read_to_string(&self.path).unwrap_or_default(), report.step);
-            fs::write(&self.path, kept).map_err(Error::io(&self.path))?;
-            self.begun = true;
-        }
-        let line = format!("{},{:.5},{:.3e}\n", report.step, report.loss, report.rate);
-        if report.step >= self.last + Self::SHOWN {
-            cli::note(line.trim_end());
-            self.last = report.step;
-        }
-        OpenOptions::new()
-            .append(true)
-            .open(&self.path)
-            .and_then(|mut file| file.write_all(line.as_bytes()))
-            .map_err(Error::io(&self.path))
-    }
-}
-
-/// The head and the whole lines of steps before `step`.
-fn kept(log: &str, step: usize) -> String {
-    let is_before = |line: &&str| {
-        let number = line.split(',').next().and_then(|it| it.parse::<usize>().ok());
-        line.ends_with('\n') && number.is_some_and(|it| it < step)
-    };
-    let lines: String = log.split_inclusive('\n').filter(is_before).collect();
-    HEAD.to_owned() + &lines
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_resumed_log_goes_on_where_the_checkpoint_was() {
-        let log = "step,loss,rate\n1,0.5,1e-3\n2,0.4,1e-3\n3,0.3,1e-3\n4,0.2";
-        assert_eq!(kept(log, 3), "step,loss,rate\n1,0.5,1e-3\n2,0.4,1e-3\n");
-        assert_eq!(kept(log, 1), HEAD);
-        assert_eq!(kept("", 1), HEAD);
-    }
-
-    #[test]
-    fn a_folder_of_another_run_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let facts = |seed: &str| vec![("seed", seed.to_owned())];
-        claim(folder.path(), &facts("1")).unwrap();
-        claim(folder.path(), &facts("1")).unwrap();
-        assert!(claim(folder.path(), &facts("2")).is_err());
-    }
+    Ok(())
 }

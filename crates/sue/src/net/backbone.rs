@@ -7,8 +7,8 @@ use burn::{
 use vpr_nets::{
     aggregate::{Gem, GemConfig},
     backbone::{ResNet, ResNetConfig},
+    layer::l2_normalize,
     model::default::DefaultEncoder,
-    normalize::normalize,
 };
 
 /// What a backbone makes of `batch` images.
@@ -75,7 +75,7 @@ impl ResNetTwoGem {
 impl Backbone for ResNetGem {
     fn features(&self, images: Tensor<4>) -> Features {
         let pooled = self.pool.forward(self.backbone.forward(images));
-        Features { descriptors: normalize(pooled.clone(), 1), pooled }
+        Features { descriptors: l2_normalize(pooled.clone(), 1), pooled }
     }
 }
 
@@ -83,6 +83,6 @@ impl Backbone for ResNetTwoGem {
     fn features(&self, images: Tensor<4>) -> Features {
         let map = self.backbone.forward(images);
         let pooled = self.variance_pool.forward(map.clone());
-        Features { descriptors: normalize(self.mean_pool.forward(map), 1), pooled }
+        Features { descriptors: l2_normalize(self.mean_pool.forward(map), 1), pooled }
     }
 }

@@ -14,7 +14,6 @@ mod tests;
 mod training;
 mod triplets;
 mod variance_head;
-mod weights;
 
 pub use backbone::{Backbone, Features, ResNetGem, ResNetTwoGem};
 pub use btl::Btl;
@@ -23,4 +22,3 @@ pub use stun::{SelfTaught, Stun};
 pub use training::{Lesson, Training, default_network};
 pub use triplets::{Negatives, Triplets, mine};
 pub use variance_head::VarianceHead;
-pub use weights::save;

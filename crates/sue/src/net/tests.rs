@@ -1,6 +1,6 @@
 //! Both networks on images small enough for a test.
 
-use std::cell::RefCell;
+use std::{cell::RefCell, fs, path::Path};
 
 use burn::{
     module::Module,
@@ -11,13 +11,12 @@ use rand_chacha::ChaCha8Rng;
 use vpr_core::Error;
 use vpr_nets::{
     model::default::{DefaultEncoder, DefaultEncoderConfig},
-    train::{Batch, Checkpoint, Trainable, device, seeded},
+    train::{Batch, Run, Trainable, device, seeded},
+    weights::{Precision, save},
 };
 use vpr_vision::image::{ImageSize, RgbImage};
 
-use super::{
-    Btl, Learned, LearnedEncoder, Lesson, SelfTaught, Stun, Training, default_network, save,
-};
+use super::{Btl, Learned, LearnedEncoder, Lesson, SelfTaught, Stun, Training, default_network};
 
 fn small() -> DefaultEncoderConfig {
     DefaultEncoderConfig::new().with_widths([8, 8, 16, 16]).with_reduced(8).with_dimension(16)
@@ -43,6 +42,11 @@ fn tiny(step: usize) -> vpr_core::Result<Batch> {
         }
     }
     Ok(Batch { images, size, places })
+}
+
+/// A run in a folder, with its log.
+fn run_in(folder: &Path) -> Run {
+    Run::open(folder, &[], Training::log(&folder.join("log.csv"))).unwrap()
 }
 
 fn encoder(seed: u64) -> DefaultEncoder {
@@ -97,7 +101,7 @@ fn on_resnet_50_they_have_the_published_sizes() {
 fn an_official_student_that_is_none_is_refused_by_key() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("student.safetensors");
-    save(&encoder(1), &path, &[]).unwrap();
+    save(&encoder(1), &path, &[], Precision::Half).unwrap();
     let err = Stun::resnet50(&Device::flex()).load_official(&path).unwrap_err().to_string();
     for part in ["student.safetensors", "encoder.backbone.conv1.weight", "unexpected: head.bias"] {
         assert!(err.contains(part), "`{part}` is not in: {err}");
@@ -113,12 +117,12 @@ fn variances_begin_near_the_prior_and_the_loss_falls() {
     assert!((0.3..3.0).contains(&(mean * 16.0)), "{mean}");
 
     let losses = RefCell::new(Vec::new());
-    let checkpoint = Checkpoint::new(folder.path());
+    let mut run = run_in(folder.path());
     let observe = |report: &vpr_nets::train::Report| {
         losses.borrow_mut().push(report.loss);
         Ok(())
     };
-    let network = training(40, 3e-3).btl(encoder(7), &checkpoint, tiny, observe).unwrap();
+    let network = training(40, 3e-3).btl(encoder(7), &mut run, tiny, observe).unwrap();
     let losses = losses.into_inner();
     let last = losses[35..].iter().sum::<f64>() / 5.0;
     assert!(last < 0.3 * losses[0], "{} to {last}", losses[0]);
@@ -143,9 +147,9 @@ fn a_student_approaches_its_teacher() {
     };
     let images = tiny(60).unwrap().tensor(&device());
     let before = cosine(&Stun::init(&small(), &device()).start(5, images));
-    let checkpoint = Checkpoint::new(folder.path());
+    let mut run = run_in(folder.path());
     let training = training(60, 5e-3);
-    let pair = training.stun(&teacher, Lesson::default(), &checkpoint, tiny, observe).unwrap();
+    let pair = training.stun(&teacher, Lesson::default(), &mut run, tiny, observe).unwrap();
     let after = cosine(pair.student());
     assert!(before < 0.2 && after > 0.6, "{before} to {after}");
     let losses = losses.into_inner();
@@ -158,18 +162,19 @@ fn the_teacher_is_neither_trained_nor_kept() {
     let teacher = encoder(7);
     let images = || tiny(2_000).unwrap().tensor(&device());
     let before = values(teacher.forward(images()));
-    let checkpoint = Checkpoint::new(folder.path());
+    let mut run = run_in(folder.path());
     let pair =
-        training(2, 1e-2).stun(&teacher, Lesson::default(), &checkpoint, tiny, |_| Ok(())).unwrap();
+        training(2, 1e-2).stun(&teacher, Lesson::default(), &mut run, tiny, |_| Ok(())).unwrap();
     assert_eq!(pair.num_params(), pair.student().num_params());
     assert_eq!(values(teacher.forward(images())), before);
     assert_eq!(values(pair.teacher(images())).len(), before.len());
 }
 
 #[test]
-fn a_resumed_run_ends_with_the_same_weights() {
+fn a_resumed_run_ends_with_the_same_weights_and_log() {
     let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| Checkpoint::new(&folder.path().join(name));
+    let at = |name: &str| run_in(&folder.path().join(name));
+    let log = |name: &str| fs::read_to_string(folder.path().join(name).join("log.csv")).unwrap();
     let train = training(30, 3e-3);
     let teacher = encoder(7);
     // Killed at step 28, after the checkpoint of step 25.
@@ -177,24 +182,27 @@ fn a_resumed_run_ends_with_the_same_weights() {
         if report.step == 28 { Err(Error::Empty("patience")) } else { Ok(()) }
     };
 
-    let whole = train.btl(encoder(7), &at("a"), tiny, |_| Ok(())).unwrap();
-    assert!(train.btl(encoder(7), &at("b"), tiny, killed).is_err());
+    let whole = train.btl(encoder(7), &mut at("a"), tiny, |_| Ok(())).unwrap();
+    assert!(train.btl(encoder(7), &mut at("b"), tiny, killed).is_err());
     let mut first = 0;
     let count = |report: &vpr_nets::train::Report| {
         first = if first == 0 { report.step } else { first };
         Ok(())
     };
-    let resumed = train.btl(encoder(7), &at("b"), tiny, count).unwrap();
+    let resumed = train.btl(encoder(7), &mut at("b"), tiny, count).unwrap();
     assert_eq!(first, 26);
     let images = || tiny(2_000).unwrap().tensor(&device());
     assert_eq!(outputs(resumed.forward(images())), outputs(whole.forward(images())));
+    assert_eq!(log("b"), log("a"));
+    assert_eq!(log("a").lines().count(), 31);
 
     let lesson = Lesson::default();
-    let whole = train.stun(&teacher, lesson, &at("c"), tiny, |_| Ok(())).unwrap();
-    assert!(train.stun(&teacher, lesson, &at("d"), tiny, killed).is_err());
-    let resumed = train.stun(&teacher, lesson, &at("d"), tiny, |_| Ok(())).unwrap();
+    let whole = train.stun(&teacher, lesson, &mut at("c"), tiny, |_| Ok(())).unwrap();
+    assert!(train.stun(&teacher, lesson, &mut at("d"), tiny, killed).is_err());
+    let resumed = train.stun(&teacher, lesson, &mut at("d"), tiny, |_| Ok(())).unwrap();
     let of = |pair: &SelfTaught| outputs(pair.student().forward(images()));
     assert_eq!(of(&resumed), of(&whole));
+    assert_eq!(log("d"), log("c"));
 }
 
 #[test]
@@ -212,8 +220,8 @@ fn weights_return_from_their_file_and_others_are_refused_by_name() {
     let path = folder.path().join("btl.safetensors");
     let config = DefaultEncoderConfig::new();
     let network = Btl::init(&config, &Device::flex());
-    save(&network, &path, &[("seed", "3".to_owned())]).unwrap();
-    assert!(std::fs::metadata(&path).unwrap().len() < 2_000_000);
+    save(&network, &path, &[("seed", "3".to_owned())], Precision::Half).unwrap();
+    assert!(fs::metadata(&path).unwrap().len() < 2_000_000);
 
     let encoder = LearnedEncoder::open(Learned::Btl, &path).unwrap();
     let size = ImageSize { width: 128, height: 96 };
@@ -237,7 +245,7 @@ fn weights_return_from_their_file_and_others_are_refused_by_name() {
     }
     let err = default_network(&config, &path).unwrap_err().to_string();
     assert!(err.contains("btl.safetensors") && err.contains("trunk.reduce.weight"), "{err}");
-    std::fs::write(&path, b"nothing").unwrap();
+    fs::write(&path, b"nothing").unwrap();
     let err = LearnedEncoder::open(Learned::Btl, &path).unwrap_err().to_string();
     assert!(err.contains("btl.safetensors"), "{err}");
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use vpr_nets::{
     loss::{LogVariance, SelfTeaching},
     model::default::{DefaultEncoder, DefaultEncoderConfig},
-    train::{Batch, Checkpoint, Descent, Optimizer, Report, Schedule, Trainable, device},
+    train::{Batch, Descent, Log, Report, Run, Trainable, device},
     weights,
 };
 
@@ -22,7 +22,7 @@ pub struct Training {
     pub config: DefaultEncoderConfig,
     /// Number of steps.
     pub steps: usize,
-    /// Highest learning rate; it rises over the first twentieth and falls as a cosine.
+    /// Highest learning rate, as [`Descent::adam_w`] takes it.
     pub rate: f64,
     /// Decides the weights that training begins with.
     pub seed: u64,
@@ -49,23 +49,29 @@ pub fn default_network(config: &DefaultEncoderConfig, path: &Path) -> Result<Def
 }
 
 impl Training {
-    /// Trains the Bayesian triplet loss from `encoder`'s weights, or goes on from the newest
+    /// The log that a run of such a training keeps: a line per step.
+    #[must_use]
+    pub fn log(path: &Path) -> Log {
+        Log::new(path, &["loss", "rate"], 1)
+    }
+
+    /// Trains the Bayesian triplet loss from `encoder`'s weights, or goes on from the run's newest
     /// checkpoint. `batch(step)` must depend on nothing but `step`; `observe` is called after every
-    /// step.
+    /// step. The run's log is a [`Self::log`].
     ///
     /// # Errors
     ///
-    /// Those of `batch`, of `observe` and of the checkpoint.
+    /// Those of `batch`, of `observe` and of [`Run::descend`].
     pub fn btl(
         &self,
         encoder: DefaultEncoder,
-        checkpoint: &Checkpoint,
+        run: &mut Run,
         batch: impl Fn(usize) -> vpr_core::Result<Batch> + Sync,
         observe: impl FnMut(&Report) -> vpr_core::Result<()>,
     ) -> Result<Btl<DefaultEncoder>> {
         let images = batch(self.steps)?.tensor(&device());
         let network = Btl::init(&self.config, &device()).start(encoder, self.seed, images);
-        self.run(network, checkpoint, batch, observe)
+        self.descend(network, run, batch, observe)
     }
 
     /// Trains STUN's student under a teacher, or goes on from the newest checkpoint; otherwise as
@@ -73,39 +79,33 @@ impl Training {
     ///
     /// # Errors
     ///
-    /// Those of `batch`, of `observe` and of the checkpoint.
+    /// Those of `batch`, of `observe` and of [`Run::descend`].
     pub fn stun(
         &self,
         teacher: &DefaultEncoder,
         lesson: Lesson,
-        checkpoint: &Checkpoint,
+        run: &mut Run,
         batch: impl Fn(usize) -> vpr_core::Result<Batch> + Sync,
         observe: impl FnMut(&Report) -> vpr_core::Result<()>,
     ) -> Result<SelfTaught> {
         let images = batch(self.steps)?.tensor(&device());
         let student = Stun::init(&self.config, &device()).start(self.seed, images);
         let pair = SelfTaught::new(student, teacher, lesson.loss, lesson.log_variance);
-        self.run(pair, checkpoint, batch, observe)
+        self.descend(pair, run, batch, observe)
     }
 
-    fn run<M: Trainable>(
+    fn descend<M: Trainable>(
         &self,
         module: M,
-        checkpoint: &Checkpoint,
+        run: &mut Run,
         batch: impl Fn(usize) -> vpr_core::Result<Batch> + Sync,
         mut observe: impl FnMut(&Report) -> vpr_core::Result<()>,
     ) -> Result<M> {
-        let descent = Descent {
-            steps: self.steps,
-            schedule: Schedule::Cosine {
-                rate: self.rate,
-                last: 0.01 * self.rate,
-                warmup: self.steps.div_ceil(20),
-                steps: self.steps,
-            },
-            optimizer: Optimizer::AdamW { decay: 0.01 },
-            save_every: SAVE_EVERY,
-        };
-        Ok(descent.run(module, checkpoint, batch, |report, _| observe(report))?)
+        let descent = Descent::adam_w(self.steps, self.rate, SAVE_EVERY);
+        let network = run.descend(&descent, module, batch, |report, _| {
+            observe(report)?;
+            Ok(vec![format!("{:.5}", report.loss), format!("{:.3e}", report.rate)])
+        })?;
+        Ok(network)
     }
 }

@@ -29,7 +29,10 @@ impl<'a> Report<'a> {
     }
 
     /// Notes a problem that has its own place.
-    #[cfg_attr(not(feature = "hdf5"), expect(dead_code, reason = "for formats whose parts are read apart"))]
+    #[cfg_attr(
+        not(feature = "hdf5"),
+        expect(dead_code, reason = "for formats whose parts are read apart")
+    )]
     pub(super) fn error(&mut self, err: Error) {
         self.problems.push(err);
     }

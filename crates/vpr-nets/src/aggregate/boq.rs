@@ -6,12 +6,12 @@ use burn::nn::{LayerNorm, LayerNormConfig, Linear, LinearConfig};
 use burn::tensor::{Device, Tensor};
 
 use crate::Result;
-use crate::infer::Shapes;
+use crate::layer::l2_normalize;
 use crate::layer::{Conv2d, Conv2dConfig};
-use crate::normalize::normalize;
 use crate::transformer::{
     EncoderLayer, EncoderLayerConfig, MultiheadAttention, MultiheadAttentionConfig,
 };
+use crate::weights::Shapes;
 use crate::weights::Weights;
 
 /// Channels of an attention head in every published network.
@@ -133,7 +133,7 @@ impl Boq {
 
     fn descriptor(&self, outputs: Vec<Tensor<3>>) -> Tensor<2> {
         let x = Tensor::cat(outputs, 1).swap_dims(1, 2);
-        normalize(self.fc.forward(x).flatten(1, 2), 1)
+        l2_normalize(self.fc.forward(x).flatten(1, 2), 1)
     }
 }
 

@@ -6,9 +6,9 @@ use burn::tensor::module::adaptive_avg_pool2d;
 use burn::tensor::{Device, Tensor};
 
 use crate::Result;
-use crate::infer::Shapes;
+use crate::layer::l2_normalize;
 use crate::layer::{Conv2d, Conv2dConfig};
-use crate::normalize::normalize;
+use crate::weights::Shapes;
 use crate::weights::Weights;
 
 /// Ali-bey et al., *GSV-Cities: Toward Appropriate Supervised Visual Place Recognition* (2022);
@@ -59,6 +59,6 @@ impl ConvAp {
     #[must_use]
     pub fn forward(&self, map: Tensor<4>) -> Tensor<2> {
         let pooled = adaptive_avg_pool2d(self.channel_pool.forward(map), self.cells);
-        normalize(pooled.flatten(1, 3), 1)
+        l2_normalize(pooled.flatten(1, 3), 1)
     }
 }

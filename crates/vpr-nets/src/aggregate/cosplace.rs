@@ -7,8 +7,8 @@ use burn::tensor::{Device, Tensor};
 
 use super::gem::{Gem, GemConfig};
 use crate::Result;
-use crate::infer::Shapes;
-use crate::normalize::normalize;
+use crate::layer::l2_normalize;
+use crate::weights::Shapes;
 use crate::weights::Weights;
 
 /// Head of Berton et al., *Rethinking Visual Geo-localization for Large-Scale Applications* (2022)
@@ -66,7 +66,7 @@ impl CosPlace {
     /// `batch × channels × rows × columns` to unit descriptors, `batch × dimension`.
     #[must_use]
     pub fn forward(&self, map: Tensor<4>) -> Tensor<2> {
-        let pooled = self.gem.forward(normalize(map, 1));
-        normalize(self.fc.forward(pooled), 1)
+        let pooled = self.gem.forward(l2_normalize(map, 1));
+        l2_normalize(self.fc.forward(pooled), 1)
     }
 }

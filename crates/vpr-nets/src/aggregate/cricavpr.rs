@@ -6,9 +6,9 @@ use burn::tensor::{Device, Tensor};
 
 use super::gem::{Gem, GemConfig};
 use crate::Result;
-use crate::infer::Shapes;
-use crate::normalize::normalize;
+use crate::layer::l2_normalize;
 use crate::transformer::{Activation, EncoderLayer, EncoderLayerConfig};
+use crate::weights::Shapes;
 use crate::weights::Weights;
 
 /// Where the official code cuts a 16×16 grid into halves, and into thirds.
@@ -129,7 +129,7 @@ impl CricaVpr {
         // to the same token of the other images.
         let x = self.encoder.iter().fold(x.swap_dims(0, 1), |x, layer| layer.forward(x));
         let descriptors = x.swap_dims(0, 1).reshape([batch, TOKENS * dim]);
-        BatchDependent(normalize(descriptors, 1))
+        BatchDependent(l2_normalize(descriptors, 1))
     }
 
     /// The pooled regions between `cuts`, row by row.
@@ -150,7 +150,7 @@ impl CricaVpr {
             for column in 0..cuts.len() {
                 let (left, width) = span(column, columns);
                 let region = map.clone().narrow(2, top, height).narrow(3, left, width);
-                pooled.push(self.gem.forward(normalize(region, 1)));
+                pooled.push(self.gem.forward(l2_normalize(region, 1)));
             }
         }
         pooled

@@ -7,8 +7,8 @@ use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};
 
 use crate::Result;
-use crate::infer::Shapes;
-use crate::normalize::normalize;
+use crate::layer::l2_normalize;
+use crate::weights::Shapes;
 use crate::weights::Weights;
 
 /// Ali-bey et al., *MixVPR: Feature Mixing for Visual Place Recognition* (2023); `amaralibey/MixVPR`.
@@ -100,7 +100,7 @@ impl MixVpr {
         let x = self.mix.iter().fold(map.flatten(2, 3), |x, mixer| mixer.forward(x));
         let x = self.channel_proj.forward(x.swap_dims(1, 2));
         let x = self.row_proj.forward(x.swap_dims(1, 2));
-        normalize(x.flatten(1, 2), 1)
+        l2_normalize(x.flatten(1, 2), 1)
     }
 }
 

@@ -8,8 +8,8 @@ use burn::tensor::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::Result;
-use crate::infer::Shapes;
-use crate::normalize::normalize;
+use crate::layer::l2_normalize;
+use crate::weights::Shapes;
 use crate::weights::Weights;
 
 /// What is done with the cluster centres: the sign differs between published weights.
@@ -67,12 +67,12 @@ pub fn vlad(
         Centres::Subtracted => sums - shift,
         Centres::Added => sums + shift,
     };
-    let residuals = if form.intra_normalise { normalize(residuals, 1) } else { residuals };
+    let residuals = if form.intra_normalise { l2_normalize(residuals, 1) } else { residuals };
     let ordered = match form.order {
         Order::ChannelMajor => residuals,
         Order::ClusterMajor => residuals.swap_dims(1, 2),
     };
-    normalize(ordered.flatten(1, 2), 1)
+    l2_normalize(ordered.flatten(1, 2), 1)
 }
 
 /// NetVLAD with the keys and shapes of hloc: `score_proj.weight` (clusters × dim × 1), `centers` (dim × clusters).
@@ -150,7 +150,7 @@ impl NetVlad {
     /// `batch × dim × n` features to unit descriptors, `batch × dim · clusters`.
     #[must_use]
     pub fn forward(&self, features: Tensor<3>) -> Tensor<2> {
-        let features = if self.normalise_input { normalize(features, 1) } else { features };
+        let features = if self.normalise_input { l2_normalize(features, 1) } else { features };
         let weight = self.score_proj.weight.val();
         let [clusters, dim, _] = weight.dims();
         let bias = self.score_proj.bias.as_ref().map(Param::val);
@@ -216,7 +216,7 @@ impl PytorchNetVlad {
     /// `batch × dim × rows × columns` to unit descriptors, `batch × clusters · dim`.
     #[must_use]
     pub fn forward(&self, map: Tensor<4>) -> Tensor<2> {
-        let map = normalize(map, 1);
+        let map = l2_normalize(map, 1);
         let assignment = softmax(self.conv.forward(map.clone()).flatten::<3>(2, 3), 1);
         let form = VladForm { order: Order::ClusterMajor, ..VladForm::default() };
         vlad(map.flatten(2, 3), assignment, self.centroids.val().transpose(), form)

@@ -7,9 +7,9 @@ use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};
 
 use crate::Result;
-use crate::infer::Shapes;
+use crate::layer::l2_normalize;
 use crate::layer::{Conv2d, Conv2dConfig};
-use crate::normalize::normalize;
+use crate::weights::Shapes;
 use crate::weights::Weights;
 
 /// Izquierdo and Civera, *Optimal Transport Aggregation for Visual Place Recognition* (2024);
@@ -127,9 +127,9 @@ impl Salad {
         let features = self.cluster_features.forward(map.clone());
         let scores = self.score.forward(map);
         let assignment = transport(scores, self.dust_bin.val(), self.iterations);
-        let clusters = normalize(features.matmul(assignment.swap_dims(1, 2)), 1);
-        let token = normalize(self.token_features.forward(token), 1);
-        normalize(Tensor::cat(vec![token, clusters.flatten(1, 2)], 1), 1)
+        let clusters = l2_normalize(features.matmul(assignment.swap_dims(1, 2)), 1);
+        let token = l2_normalize(self.token_features.forward(token), 1);
+        l2_normalize(Tensor::cat(vec![token, clusters.flatten(1, 2)], 1), 1)
     }
 }
 

@@ -6,7 +6,7 @@ use burn::tensor::{Device, Tensor, TensorData};
 use vpr_core::knn::{Pca, PcaParams};
 use vpr_core::{Descriptors, Result};
 
-use crate::normalize::normalize;
+use crate::layer::l2_normalize;
 
 /// An affine map to fewer values and a final normalisation; keys `weight` and `bias` as a torch linear layer.
 ///
@@ -55,7 +55,7 @@ impl Whitening {
     #[must_use]
     pub fn forward(&self, descriptors: Tensor<2>) -> Tensor<2> {
         let weight = self.weight.val().transpose();
-        normalize(linear(descriptors, weight, Some(self.bias.val())), 1)
+        l2_normalize(linear(descriptors, weight, Some(self.bias.val())), 1)
     }
 }
 

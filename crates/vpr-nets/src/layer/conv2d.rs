@@ -15,7 +15,7 @@ use super::{
     gradient::{Convolve, Sizes},
     kernel::{Activation, Finish, Geometry, Weights},
 };
-use crate::plain::{Plain, tensor};
+use crate::layer::memory::{InMemory, tensor};
 
 /// Configuration of [`Conv2d`]; the defaults are those of `torch.nn.Conv2d`.
 #[derive(Config, Debug)]
@@ -114,12 +114,12 @@ impl Clone for Cache {
 /// Holds on to the weights it was made from, so that their memory is not reused for others.
 #[derive(Debug)]
 struct PackedWeights {
-    source: Plain,
+    source: InMemory,
     groups: Vec<Weights>,
 }
 
 impl Cache {
-    fn get(&self, source: Plain, n_groups: usize) -> Arc<PackedWeights> {
+    fn get(&self, source: InMemory, n_groups: usize) -> Arc<PackedWeights> {
         let mut packed = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(packed) = packed.as_ref().filter(|it| it.source.is_same(&source)) {
             return Arc::clone(packed);
@@ -134,7 +134,7 @@ impl Cache {
 pub(super) struct Last {
     pub(super) scale: Option<Vec<f32>>,
     pub(super) shift: Option<Vec<f32>>,
-    pub(super) residual: Option<Plain>,
+    pub(super) residual: Option<InMemory>,
     pub(super) activation: Activation,
 }
 
@@ -177,7 +177,7 @@ impl Conv2d {
     /// The bias as numbers, zeros if there is none; `None` if it cannot be read here.
     pub(super) fn bias_values(&self) -> Option<Vec<f32>> {
         match &self.bias {
-            Some(bias) => Some(Plain::new(&bias.val())?.values().to_vec()),
+            Some(bias) => Some(InMemory::new(&bias.val())?.values().to_vec()),
             None => Some(vec![0.0; self.weight.dims()[0]]),
         }
     }
@@ -186,11 +186,11 @@ impl Conv2d {
     pub(super) fn fast(&self, input: &Tensor<4>, last: &Last) -> Option<Tensor<4>> {
         let geometry = self.geometry(input.dims())?;
         let output = geometry.output()?;
-        let plain = Plain::new(input)?;
-        let packed = self.packed.get(Plain::new(&self.weight.val())?, self.groups);
+        let read = InMemory::new(input)?;
+        let packed = self.packed.get(InMemory::new(&self.weight.val())?, self.groups);
         let [n_images, ..] = geometry.input;
         let n_pixels = output[0] * output[1];
-        let residual = last.residual.as_ref().map(Plain::values);
+        let residual = last.residual.as_ref().map(InMemory::values);
         let part = |of: &Option<Vec<f32>>, group: usize| {
             of.as_ref().map(|it| it[group * geometry.n_out..][..geometry.n_out].to_vec())
         };
@@ -202,12 +202,12 @@ impl Conv2d {
                 activation: last.activation,
             };
             let weights = packed.source.values();
-            packed.groups[0].convolve(plain.values(), weights, &geometry, output, finish)
+            packed.groups[0].convolve(read.values(), weights, &geometry, output, finish)
         } else {
             let per_weight = geometry.n_out * geometry.depth();
             let per_group = geometry.input[1] * geometry.input[2] * geometry.input[3];
             let convolve = |(group, weights): (usize, &Weights)| {
-                let input = channels_of(plain.values(), group, self.groups, per_group);
+                let input = channels_of(read.values(), group, self.groups, per_group);
                 let residual = residual
                     .map(|it| channels_of(it, group, self.groups, geometry.n_out * n_pixels));
                 let (scale, shift) = (part(&last.scale, group), part(&last.shift, group));

@@ -6,7 +6,7 @@ use burn::{
 };
 
 use super::{Activation, Conv2d, conv2d::Last, normalize::batch_norm};
-use crate::plain::Plain;
+use crate::layer::memory::InMemory;
 
 /// `activation(norm(conv(input)) + residual)`.
 ///
@@ -56,12 +56,12 @@ fn last(
     residual: Option<&Tensor<4>>,
     activation: Activation,
 ) -> Option<Last> {
-    let read = |tensor: &Tensor<1>| Plain::new(tensor);
+    let read = |tensor: &Tensor<1>| InMemory::new(tensor);
     let (gamma, beta) = (read(&norm.gamma.val())?, read(&norm.beta.val())?);
     let (mean, variance) = (read(&norm.running_mean.value())?, read(&norm.running_var.value())?);
     let bias = conv.bias_values()?;
     let residual = match residual {
-        Some(residual) => Some(Plain::new(residual)?),
+        Some(residual) => Some(InMemory::new(residual)?),
         None => None,
     };
     #[expect(clippy::cast_possible_truncation, reason = "a small constant")]

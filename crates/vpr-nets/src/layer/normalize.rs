@@ -21,7 +21,7 @@ use super::{
     conv2d::is_recorded_here,
     gradient::{tensor, unrecorded, values},
 };
-use crate::fused::{Moments, Sets, Sharing};
+use crate::layer::one_pass::{Moments, Sets, Sharing};
 
 /// Normalisation of `[images, channels, height, width]` by the statistics of the batch where `norm`
 /// is in training, by its running ones elsewhere; burn's layer, whose running variance is over n

@@ -10,10 +10,10 @@ use burn::{
     tensor::Tensor,
 };
 
-use super::normalize;
-use crate::{
-    fused::{self, Affine},
-    plain::{Plain, tensor},
+use super::{
+    memory::{InMemory, tensor},
+    normalize,
+    one_pass::{self, Affine},
 };
 
 /// Rows through a linear layer: `n × from` to `n × to`.
@@ -27,12 +27,12 @@ pub fn linear(layer: &Linear, rows: Tensor<2>) -> Tensor<2> {
     let [from, to] = layer.weight.dims();
     assert_eq!(length, from, "values of a row");
     let values = || {
-        let weight = Plain::new(&layer.weight.val())?;
+        let weight = InMemory::new(&layer.weight.val())?;
         let bias = match &layer.bias {
-            Some(bias) => Plain::new(&bias.val())?.values().to_vec(),
+            Some(bias) => InMemory::new(&bias.val())?.values().to_vec(),
             None => vec![0.0; to],
         };
-        Some(fused::affine_map(Plain::new(&rows)?.values(), weight.values(), &bias))
+        Some(one_pass::affine_map(InMemory::new(&rows)?.values(), weight.values(), &bias))
     };
     match values() {
         Some(values) => tensor(values, [n, to], &rows.device()),
@@ -51,13 +51,13 @@ pub fn group_norm(norm: &GroupNorm, map: Tensor<4>) -> Tensor<4> {
     assert_eq!(channels, norm.num_channels, "channels of a map");
     let per_group = channels / norm.num_groups;
     let values = || {
-        let gamma = Plain::new(&norm.gamma.as_ref()?.val())?;
-        let beta = Plain::new(&norm.beta.as_ref()?.val())?;
+        let gamma = InMemory::new(&norm.gamma.as_ref()?.val())?;
+        let beta = InMemory::new(&norm.beta.as_ref()?.val())?;
         #[expect(clippy::cast_possible_truncation, reason = "a small constant")]
         let epsilon = norm.epsilon as f32;
         let affine = Affine { gamma: gamma.values(), beta: beta.values(), epsilon };
-        let (run, map) = (per_group * height * width, Plain::new(&map)?);
-        Some(fused::standardize(map.values(), run, per_group, affine))
+        let (run, map) = (per_group * height * width, InMemory::new(&map)?);
+        Some(one_pass::standardize(map.values(), run, per_group, affine))
     };
     match values() {
         Some(values) => tensor(values, shape, &map.device()),
@@ -70,27 +70,15 @@ pub fn group_norm(norm: &GroupNorm, map: Tensor<4>) -> Tensor<4> {
 #[must_use]
 pub fn standardize(images: Tensor<4>, epsilon: f32) -> Tensor<4> {
     let shape @ [batch, channels, height, width] = images.dims();
-    if let Some(plain) = Plain::new(&images) {
+    if let Some(values) = InMemory::new(&images) {
         let affine = Affine { gamma: &[1.0], beta: &[0.0], epsilon };
-        let values = fused::standardize(plain.values(), height * width, 1, affine);
+        let values = one_pass::standardize(values.values(), height * width, 1, affine);
         return tensor(values, shape, &images.device());
     }
     let flat = images.reshape([batch, channels, height * width]);
     let centred = flat.clone() - flat.mean_dim(2);
     let variance = centred.clone().square().mean_dim(2);
     (centred / (variance + epsilon).sqrt()).reshape(shape)
-}
-
-/// Rows, `n × length`, divided by √(Σ x² + 1e-12).
-#[must_use]
-pub fn unit_rows(rows: Tensor<2>) -> Tensor<2> {
-    const FLOOR: f32 = 1e-12;
-    let shape = rows.dims();
-    if let Some(plain) = Plain::new(&rows) {
-        return tensor(fused::unit(plain.values(), shape[1], FLOOR), shape, &rows.device());
-    }
-    let length = (rows.clone().square().sum_dim(1) + FLOOR).sqrt();
-    rows / length
 }
 
 #[cfg(test)]
@@ -137,8 +125,5 @@ mod tests {
         let images = Tensor::<4>::random([2, 3, 8, 11], NORMAL, &device);
         let recorded = Tensor::from_data(images.to_data(), &recording);
         assert_close(standardize(images, 1e-4), standardize(recorded, 1e-4).inner());
-        let rows = Tensor::<2>::random([40, 19], NORMAL, &device);
-        let recorded = Tensor::from_data(rows.to_data(), &recording);
-        assert_close(unit_rows(rows), unit_rows(recorded).inner());
     }
 }

@@ -12,8 +12,8 @@ use crate::aggregate::{
 };
 use crate::backbone::vgg::Crop;
 use crate::backbone::{ResNet, Vgg16, Vgg16Config};
-use crate::infer::Shapes;
-use crate::normalize::normalize;
+use crate::layer::l2_normalize;
+use crate::weights::Shapes;
 use crate::weights::Weights;
 
 /// A convolutional backbone: what CosPlace and EigenPlaces were published on.
@@ -72,7 +72,7 @@ impl Describe for Parts<Trunk, CosPlace> {
 
 impl Describe for Parts<ResNet, Gem> {
     fn describe(&self, images: Tensor<4>) -> Tensor<2> {
-        normalize(self.aggregator.forward(self.backbone.forward(images)), 1)
+        l2_normalize(self.aggregator.forward(self.backbone.forward(images)), 1)
     }
 }
 

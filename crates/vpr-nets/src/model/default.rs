@@ -11,16 +11,17 @@ use burn::{
     config::Config,
     module::{Module, Param},
     nn::{GroupNorm, GroupNormConfig, Linear, LinearConfig, PaddingConfig2d},
-    store::{BurnToPyTorchAdapter, ModuleSnapshot, PyTorchToBurnAdapter, SafetensorsStore},
+    store::{ModuleSnapshot, PyTorchToBurnAdapter, SafetensorsStore},
     tensor::{Device, Tensor, TensorData, activation::relu, module::adaptive_avg_pool2d},
 };
 use ndarray::Array2;
 use vpr_core::{Descriptors, Error, Result};
 
 use crate::{
-    layer::{Conv2d, Conv2dConfig, group_norm, linear, standardize, unit_rows},
+    layer::{Conv2d, Conv2dConfig, group_norm, l2_normalize_rows, linear, standardize},
     loss::SupervisedContrastive,
     train::{Affine, Trainable},
+    weights::{self, Precision},
 };
 
 /// Width and height of the images it was trained on, pixels.
@@ -131,7 +132,7 @@ impl DefaultEncoder {
     /// The projection of pooled features to unit descriptors.
     #[must_use]
     pub fn project(&self, pooled: Tensor<2>) -> Tensor<2> {
-        unit_rows(linear(&self.head, pooled))
+        l2_normalize_rows(linear(&self.head, pooled))
     }
 
     /// Sets the projection so that these images' pooled features enter it with mean 0 and variance 1,
@@ -161,18 +162,14 @@ impl DefaultEncoder {
         Ok(self)
     }
 
-    /// Writes weights under `PyTorch`'s names and axes, with `metadata` beside them.
+    /// Writes weights under `PyTorch`'s names and axes, with `facts` beside them, as
+    /// [`weights::save`].
     ///
     /// # Errors
     ///
-    /// [`Error::Format`] with the file.
-    pub fn save(&self, path: &Path, metadata: &[(&str, &str)]) -> Result<()> {
-        let store =
-            SafetensorsStore::from_file(path).with_to_adapter(BurnToPyTorchAdapter).overwrite(true);
-        let mut store =
-            metadata.iter().fold(store, |store, (key, value)| store.metadata(*key, *value));
-        self.save_into(&mut store)
-            .map_err(|cause| Error::format(path, "weights", cause.to_string()))
+    /// [`Error::Format`] and [`Error::Io`] with the file.
+    pub fn save(&self, path: &Path, facts: &[(&str, String)]) -> Result<()> {
+        Ok(weights::save(self, path, facts, Precision::Single)?)
     }
 
     /// Describes images without tensors: `images` holds `n × 3 × height × width` values in 0 to

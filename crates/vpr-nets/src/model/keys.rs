@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::backbone::ResNetConfig;
 use crate::backbone::resnet::Block;
-use crate::infer::Shapes;
+use crate::weights::Shapes;
 use crate::weights::Weights;
 
 /// A ResNet that was made a `Sequential` of its children, below `backbone.` or `backbone.net.`.

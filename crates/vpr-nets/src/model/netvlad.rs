@@ -9,7 +9,7 @@ use crate::Result;
 use crate::aggregate::{NetVlad, NetVladConfig, Whitening};
 use crate::backbone::vgg::Crop;
 use crate::backbone::{Vgg16, Vgg16Config};
-use crate::infer::Shapes;
+use crate::weights::Shapes;
 use crate::weights::Weights;
 
 /// NetVLAD and the whitening behind it.

@@ -16,7 +16,7 @@ use burn::{
 use pulp::Arch;
 use rayon::prelude::*;
 
-use crate::plain::{Plain, PlainMut};
+use crate::layer::memory::{InMemory, InMemoryMut};
 
 /// Share of the last moments that is kept.
 const BETA: [f32; 2] = [0.9, 0.999];
@@ -54,15 +54,16 @@ impl Optimizer for Adam {
         gradient: Tensor<D>,
         state: Option<AdamState<D>>,
     ) -> (Tensor<D>, Option<AdamState<D>>) {
-        if let Some(gradient) = Plain::new(&gradient)
-            && Plain::new(&weights).is_some()
+        if let Some(gradient) = InMemory::new(&gradient)
+            && InMemory::new(&weights).is_some()
         {
             let zeros = || weights.zeros_like();
             let (time, first, second) = match state {
                 Some(AdamState { momentum: it }) => (it.time, it.moment_1, it.moment_2),
                 None => (0, zeros(), zeros()),
             };
-            let [mut weights, mut first, mut second] = [weights, first, second].map(PlainMut::new);
+            let [mut weights, mut first, mut second] =
+                [weights, first, second].map(InMemoryMut::new);
             let step = Step::new(rate, time + 1, self.decay);
             step.take_all(weights.values(), first.values(), second.values(), gradient.values());
             let past = AdaptiveMomentumState::new(time + 1, first.tensor(), second.tensor());

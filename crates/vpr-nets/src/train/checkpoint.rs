@@ -1,7 +1,7 @@
 //! Checkpoints: what a killed run goes on from.
 
 use std::{
-    fs,
+    fs::{self, File},
     path::{Path, PathBuf},
 };
 
@@ -12,10 +12,16 @@ use burn::{
 };
 use vpr_core::{Error, Result};
 
+/// Names of whole states begin with this.
+const STEP: &str = "step-";
+/// Names of those that are being written begin with this.
+const PARTIAL: &str = ".partial-";
+
 /// A folder with the state of a run: `step-N/{weights,optimizer}.bpk`, of which the newest counts.
 ///
-/// A state is written under a temporary name and renamed, so a kill leaves the last whole one. A
-/// run that goes on from it takes the same steps as one that was never killed, bit by bit.
+/// A state is written under a temporary name, synced and renamed, so a kill leaves the last whole
+/// one. A run that goes on from it takes the same steps as one that was never killed, bit by bit.
+/// One process at a time writes to a folder; [`super::Run`] sees to it.
 #[derive(Clone, Debug)]
 pub struct Checkpoint {
     folder: PathBuf,
@@ -26,6 +32,15 @@ impl Checkpoint {
     #[must_use]
     pub fn new(folder: &Path) -> Self {
         Self { folder: folder.to_owned() }
+    }
+
+    /// Steps done at the newest state; `None` if there is none.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] with the folder.
+    pub fn latest(&self) -> Result<Option<usize>> {
+        Ok(self.numbers(STEP)?.into_iter().max())
     }
 
     /// Writes the state after `step` steps and removes older ones.
@@ -39,19 +54,27 @@ impl Checkpoint {
         module: &M,
         optimizer: &ModuleOptimizer,
     ) -> Result<()> {
-        let partial = self.folder.join(format!(".partial-{}", std::process::id()));
-        let done = self.folder.join(format!("step-{step}"));
+        let done = self.folder.join(format!("{STEP}{step}"));
         if done.exists() {
             return Ok(());
         }
+        // What a killed run left.
+        for process in self.numbers(PARTIAL)? {
+            let left = self.folder.join(format!("{PARTIAL}{process}"));
+            fs::remove_dir_all(&left).map_err(Error::io(&left))?;
+        }
+        let partial = self.folder.join(format!("{PARTIAL}{}", std::process::id()));
         fs::create_dir_all(&partial).map_err(Error::io(&partial))?;
         let weights = partial.join("weights.bpk");
         module.clone().into_record().save(&weights).map_err(broken(&weights))?;
         let state = partial.join("optimizer.bpk");
         optimizer.to_record().save(&state).map_err(broken(&state))?;
+        for path in [&weights, &state] {
+            File::open(path).and_then(|file| file.sync_all()).map_err(Error::io(path))?;
+        }
         fs::rename(&partial, &done).map_err(Error::io(&done))?;
-        for old in self.steps()?.into_iter().filter(|old| *old != step) {
-            let old = self.folder.join(format!("step-{old}"));
+        for old in self.numbers(STEP)?.into_iter().filter(|old| *old != step) {
+            let old = self.folder.join(format!("{STEP}{old}"));
             fs::remove_dir_all(&old).map_err(Error::io(&old))?;
         }
         Ok(())
@@ -68,8 +91,8 @@ impl Checkpoint {
         module: M,
         optimizer: ModuleOptimizer,
     ) -> Result<Option<(usize, M, ModuleOptimizer)>> {
-        let Some(step) = self.steps()?.into_iter().max() else { return Ok(None) };
-        let folder = self.folder.join(format!("step-{step}"));
+        let Some(step) = self.latest()? else { return Ok(None) };
+        let folder = self.folder.join(format!("{STEP}{step}"));
         let weights = folder.join("weights.bpk");
         let record = ModuleRecord::load(&weights).map_err(broken(&weights))?;
         let module = module.load_record(record);
@@ -78,17 +101,18 @@ impl Checkpoint {
         Ok(Some((step, module, optimizer.load_record(record))))
     }
 
-    fn steps(&self) -> Result<Vec<usize>> {
+    /// The numbers after `prefix` in the names of what is in the folder.
+    fn numbers(&self, prefix: &str) -> Result<Vec<usize>> {
         if !self.folder.exists() {
             return Ok(Vec::new());
         }
-        let mut steps = Vec::new();
+        let mut numbers = Vec::new();
         for entry in fs::read_dir(&self.folder).map_err(Error::io(&self.folder))? {
             let name = entry.map_err(Error::io(&self.folder))?.file_name();
-            let step = name.to_str().and_then(|name| name.strip_prefix("step-"));
-            steps.extend(step.and_then(|step| step.parse::<usize>().ok()));
+            let number = name.to_str().and_then(|name| name.strip_prefix(prefix));
+            numbers.extend(number.and_then(|number| number.parse::<usize>().ok()));
         }
-        Ok(steps)
+        Ok(numbers)
     }
 }
 
@@ -133,6 +157,7 @@ mod tests {
     #[test]
     fn a_resumed_run_ends_with_the_same_bits() {
         let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join(".partial-1")).unwrap();
         let checkpoint = Checkpoint::new(folder.path());
         let (module, optimizer) = fresh();
         assert!(checkpoint.load(module, optimizer).unwrap().is_none());
@@ -150,6 +175,8 @@ mod tests {
         let (done, module, optimizer) = checkpoint.load(module, optimizer).unwrap().unwrap();
         assert_eq!(done, 5);
         assert_eq!(weights(&steps(4, module, optimizer).0), whole);
+        let names = fs::read_dir(folder.path()).unwrap().map(|it| it.unwrap().file_name());
+        assert_eq!(names.collect::<Vec<_>>(), ["step-5"]);
     }
 
     #[test]

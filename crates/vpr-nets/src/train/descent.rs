@@ -66,11 +66,20 @@ pub struct Report {
 }
 
 impl Descent {
+    /// `AdamW` with decay 0.01 under [`Schedule::warm_cosine`]: how the networks of this workspace
+    /// are trained.
+    #[must_use]
+    pub fn adam_w(steps: usize, rate: f64, save_every: usize) -> Self {
+        let schedule = Schedule::warm_cosine(steps, rate);
+        Self { steps, schedule, optimizer: Optimizer::AdamW { decay: 0.01 }, save_every }
+    }
+
     /// Trains from the newest checkpoint, or from `module` if there is none.
     ///
     /// `batch(step)` must depend on nothing but `step`, so that a resumed run sees what the killed
     /// one would have seen; it runs ahead on a thread of its own. `observe` is called after every
-    /// step with the module as it then is.
+    /// step with the module as it then is, before the checkpoint of that step: what it keeps of a
+    /// step is there if the run goes on from it.
     ///
     /// # Errors
     ///
@@ -109,10 +118,10 @@ impl Descent {
                 let gradients = GradientsParams::from_grads(loss.backward(), &module);
                 module = optimizer.step(rate, module, gradients);
                 let report = Report { step: step + 1, loss: value, rate };
+                observe(&report, &module)?;
                 if report.step.is_multiple_of(self.save_every) || report.step == self.steps {
                     checkpoint.save(report.step, &module, &optimizer)?;
                 }
-                observe(&report, &module)?;
             }
             Ok(module)
         })

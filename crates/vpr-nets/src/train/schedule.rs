@@ -29,7 +29,18 @@ pub enum Schedule {
     },
 }
 
+/// Longest warm-up of [`Schedule::warm_cosine`], steps.
+const LONGEST_WARMUP: usize = 200;
+
 impl Schedule {
+    /// A cosine over `steps` steps from `rate` to a hundredth of it, after a warm-up over the first
+    /// twentieth, of at most 200 steps.
+    #[must_use]
+    pub fn warm_cosine(steps: usize, rate: f64) -> Self {
+        let warmup = steps.div_ceil(20).min(LONGEST_WARMUP);
+        Self::Cosine { rate, last: 0.01 * rate, warmup, steps }
+    }
+
     /// The rate of a step.
     #[must_use]
     pub fn rate(&self, step: usize) -> f64 {
@@ -67,5 +78,9 @@ mod tests {
         assert!((cosine.rate(54) - 1.0).abs() < 1e-12 && cosine.rate(104) < 1e-12);
         assert!(cosine.rate(5_000) < 1e-12);
         assert_eq!(Schedule::Constant(0.1).rate(7), 0.1);
+        let warm = |steps, warmup| Schedule::Cosine { rate: 2.0, last: 0.02, warmup, steps };
+        for (steps, warmup) in [(1, 1), (600, 30), (3_000, 150), (4_000, 200), (9_000, 200)] {
+            assert_eq!(Schedule::warm_cosine(steps, 2.0), warm(steps, warmup));
+        }
     }
 }

@@ -21,6 +21,8 @@ mod apply;
 mod checkpoint;
 mod legacy;
 mod safetensors;
+mod save;
+mod shapes;
 mod storage;
 mod zip;
 
@@ -28,6 +30,9 @@ use std::{collections::BTreeMap, fmt, fs, path::Path};
 
 use burn::store::{KeyRemapper, ModuleSnapshot};
 use sha2::{Digest as _, Sha256};
+
+pub use save::{Precision, save};
+pub(crate) use shapes::Shapes;
 
 use crate::{Error, Result};
 

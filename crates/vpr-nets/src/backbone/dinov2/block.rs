@@ -8,9 +8,9 @@ use burn::tensor::ops::AttentionModuleOptions;
 use burn::tensor::{Device, Tensor};
 
 use super::{DinoV2Config, NORM_EPSILON};
-use crate::fused::{self, Affine};
+use crate::layer::memory::{InMemory, tensor};
+use crate::layer::one_pass::{self, Affine};
 use crate::layer::{self, Heads};
-use crate::plain::{Plain, tensor};
 
 /// One block; tokens `batch × n × dim` keep their shape.
 #[derive(Module, Debug)]
@@ -58,8 +58,8 @@ impl Block {
 /// taken along where values are read anyway.
 pub(super) fn run_in_memory(blocks: &[Block], x: &Tensor<3>) -> Option<Tensor<3>> {
     let shape = x.dims();
-    let mut x = Plain::new(x)?.values().to_vec();
-    let parameters: Vec<_> = blocks.iter().map(Block::plain).collect::<Option<_>>()?;
+    let mut x = InMemory::new(x)?.values().to_vec();
+    let parameters: Vec<_> = blocks.iter().map(Block::in_memory).collect::<Option<_>>()?;
     for (block, parameters) in blocks.iter().zip(&parameters) {
         block.step(parameters, &mut x, shape)?;
     }
@@ -68,19 +68,19 @@ pub(super) fn run_in_memory(blocks: &[Block], x: &Tensor<3>) -> Option<Tensor<3>
 
 /// The parameters of a block that are no matrices.
 struct Vectors {
-    norm1: [Plain; 2],
-    qkv_bias: Plain,
-    proj_bias: Plain,
-    ls1: Plain,
-    norm2: [Plain; 2],
-    fc1_bias: Plain,
-    fc2_bias: Plain,
-    ls2: Plain,
+    norm1: [InMemory; 2],
+    qkv_bias: InMemory,
+    proj_bias: InMemory,
+    ls1: InMemory,
+    norm2: [InMemory; 2],
+    fc1_bias: InMemory,
+    fc2_bias: InMemory,
+    ls2: InMemory,
 }
 
 impl Block {
-    fn plain(&self) -> Option<Vectors> {
-        let vector = |param: &Param<Tensor<1>>| Plain::new(&param.val());
+    fn in_memory(&self) -> Option<Vectors> {
+        let vector = |param: &Param<Tensor<1>>| InMemory::new(&param.val());
         let norm = |norm: &LayerNorm| Some([vector(&norm.gamma)?, vector(norm.beta.as_ref()?)?]);
         let bias = |layer: &Linear| vector(layer.bias.as_ref()?);
         Some(Vectors {
@@ -97,24 +97,24 @@ impl Block {
 
     /// One block on the tokens `x`, a row of `dim` values each.
     fn step(&self, own: &Vectors, x: &mut [f32], [batch, tokens, dim]: [usize; 3]) -> Option<()> {
-        let normed = fused::layer_norm(x, affine(&own.norm1));
+        let normed = one_pass::layer_norm(x, affine(&own.norm1));
         let qkv = product(&normed, &self.attn.qkv)?;
         let count = self.attn.heads;
         let heads = Heads { batch, tokens, count, size: dim / count };
         let attended = layer::attend(&qkv, own.qkv_bias.values(), heads);
         let attended = product(&attended, &self.attn.proj)?;
-        fused::add_scaled_in_place(x, &attended, own.proj_bias.values(), own.ls1.values());
+        one_pass::add_scaled_in_place(x, &attended, own.proj_bias.values(), own.ls1.values());
 
-        let normed = fused::layer_norm(x, affine(&own.norm2));
+        let normed = one_pass::layer_norm(x, affine(&own.norm2));
         let inner = product(&normed, &self.mlp.fc1)?;
-        let inner = fused::gelu(&inner, own.fc1_bias.values());
+        let inner = one_pass::gelu(&inner, own.fc1_bias.values());
         let outer = product(&inner, &self.mlp.fc2)?;
-        fused::add_scaled_in_place(x, &outer, own.fc2_bias.values(), own.ls2.values());
+        one_pass::add_scaled_in_place(x, &outer, own.fc2_bias.values(), own.ls2.values());
         Some(())
     }
 }
 
-fn affine(norm: &[Plain; 2]) -> Affine<'_> {
+fn affine(norm: &[InMemory; 2]) -> Affine<'_> {
     let [gamma, beta] = norm;
     Affine { gamma: gamma.values(), beta: beta.values(), epsilon: NORM_EPSILON }
 }
@@ -123,7 +123,7 @@ fn affine(norm: &[Plain; 2]) -> Affine<'_> {
 fn product(rows: &[f32], linear: &Linear) -> Option<Vec<f32>> {
     let weight = linear.weight.val();
     let [depth, _] = weight.dims();
-    Some(layer::product(rows, Plain::new(&weight)?.values(), depth))
+    Some(layer::product(rows, InMemory::new(&weight)?.values(), depth))
 }
 
 /// Self-attention with one projection for queries, keys and values.

@@ -16,8 +16,8 @@ use burn::tensor::{Device, Tensor};
 pub use self::block::Block;
 pub use self::position::Interpolation;
 use crate::Result;
-use crate::infer::Shapes;
 use crate::layer::{Conv2d, Conv2dConfig};
+use crate::weights::Shapes;
 use crate::weights::Weights;
 
 const NORM_EPSILON: f32 = 1e-6;

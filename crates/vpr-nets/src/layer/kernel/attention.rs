@@ -8,7 +8,7 @@ use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
 use super::multiply::{DEPTH_BLOCK, Lanes, TILE, Tile, dispatch, multiply};
-use crate::fused::exp_of_negative;
+use crate::layer::one_pass::exp_of_negative;
 
 /// Rows that one thread copies at a time.
 const ROWS_PER_TASK: usize = 32;

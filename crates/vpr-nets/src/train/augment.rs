@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::pixels::Pixels;
+use super::Pixels;
 
 /// Draws one variant of `image` at the size of `output`, three planes of values in 0 to 1.
 pub fn augment(image: Pixels<'_>, size: (usize, usize), seed: u64, output: &mut [f32]) {

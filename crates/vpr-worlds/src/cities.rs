@@ -2,14 +2,13 @@
 
 use std::{fs, path::Path};
 
-use anyhow::Context;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use vpr_report::cli;
-use vpr_worlds::{RENDERER, Recipe, Traverse, photograph_city, recipe_with};
+use vpr_core::{Error, Observer, Result};
+use vpr_files::replace;
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::pixels::Album;
+use crate::{RENDERER, Recipe, Traverse, photograph_city, recipe_with};
 
 /// Places of a city.
 pub const PLACES: usize = 80;
@@ -19,46 +18,49 @@ pub const VISITS: usize = 5;
 pub const AVENUES: usize = 4;
 /// Seed of the first city; the worlds that come with `vpr-worlds` have seeds below.
 const FIRST_SEED: u64 = 5_001;
-/// Width and height of an image: a crop of it becomes the network's input.
-const SIZE: (usize, usize) = (160, 120);
+/// Width and height of an image: a crop of it becomes a network's input.
+pub const SIZE: (usize, usize) = (160, 120);
 
-/// The cities, rendered unless the cache has them: `PLACES × VISITS` images each, a place's visits
-/// beside each other.
+/// The pixels of `n` cities, rendered unless the cache has them: of each `PLACES × VISITS` images
+/// back to back, rows of red, green, blue at [`SIZE`], a place's visits beside each other.
 ///
 /// # Errors
 ///
-/// A cache that cannot be written, by its path.
-pub fn open(n: usize, seed: u64, cache: &Path) -> anyhow::Result<Vec<Album>> {
-    fs::create_dir_all(cache).with_context(|| cache.display().to_string())?;
-    let bar = cli::progress("cities", n);
-    let mut albums = Vec::with_capacity(n);
+/// [`Error::Io`] with the path, if the cache cannot be written.
+pub fn open(n: usize, seed: u64, cache: &Path, observer: &dyn Observer) -> Result<Vec<Vec<u8>>> {
+    fs::create_dir_all(cache).map_err(Error::io(cache))?;
+    observer.start("cities", n);
+    let mut cities = Vec::with_capacity(n);
     for city in 0..n as u64 {
         let (recipe, visits) = (recipe(seed, city)?, visits(seed, city));
-        let digest = xxh3_64(format!("{recipe:?} {visits:?}").as_bytes());
-        let path = cache.join(format!("training-{RENDERER}-{digest:016x}.rgb"));
+        let path = cache.join(file_name(&recipe, &visits));
         let bytes = match fs::read(&path) {
             Ok(bytes) if bytes.len() == PLACES * VISITS * 3 * SIZE.0 * SIZE.1 => bytes,
             _ => render(&recipe, &visits, &path)?,
         };
-        albums.push(Album::new(bytes, SIZE));
-        bar.inc(1);
+        cities.push(bytes);
+        observer.step();
     }
-    bar.finish_and_clear();
-    Ok(albums)
+    observer.end();
+    Ok(cities)
 }
 
-fn render(recipe: &Recipe, visits: &[Traverse], path: &Path) -> anyhow::Result<Vec<u8>> {
+/// Where a city lies in the cache: under a digest of all that decides it.
+fn file_name(recipe: &Recipe, visits: &[Traverse]) -> String {
+    let digest = xxh3_64(format!("{recipe:?} {visits:?}").as_bytes());
+    format!("training-{RENDERER}-{digest:016x}.rgb")
+}
+
+fn render(recipe: &Recipe, visits: &[Traverse], path: &Path) -> Result<Vec<u8>> {
     let photographs = photograph_city(recipe, visits)?;
     let bytes: Vec<u8> =
         photographs.into_iter().flat_map(|photograph| photograph.image.into_raw()).collect();
-    let partial = path.with_extension("partial");
-    fs::write(&partial, &bytes).with_context(|| partial.display().to_string())?;
-    fs::rename(&partial, path).with_context(|| path.display().to_string())?;
+    replace(path, &bytes)?;
     Ok(bytes)
 }
 
 /// Streets and camera of a city.
-fn recipe(seed: u64, city: u64) -> anyhow::Result<Recipe> {
+fn recipe(seed: u64, city: u64) -> Result<Recipe> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     random.set_stream(2 * city);
     let side = if random.random_bool(0.5) { 1.0 } else { -1.0 };
@@ -81,7 +83,7 @@ fn recipe(seed: u64, city: u64) -> anyhow::Result<Recipe> {
     ]);
     let pairs: Vec<(&str, &str)> =
         settings.iter().map(|(key, value)| (*key, value.as_str())).collect();
-    Ok(recipe_with("train-city", &pairs)?)
+    recipe_with("train-city", &pairs)
 }
 
 /// Light, weather and viewpoint of every visit: two by day, one under clouds, one that is often by
@@ -129,6 +131,19 @@ fn visit(number: usize, random: &mut ChaCha8Rng) -> Traverse {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The file's name is a digest of streets, camera, light and viewpoints: a seed gives the
+    /// cities it has always given, and what was rendered is found again.
+    #[test]
+    fn a_seed_gives_the_cities_it_has_always_given() {
+        for (seed, city, name) in [
+            (1, 0, "training-5-d0e1d04a8711b0dd.rgb"),
+            (1, 1, "training-5-a15566b77aa69c1f.rgb"),
+            (7, 39, "training-5-43aa309789f7d507.rgb"),
+        ] {
+            assert_eq!(file_name(&recipe(seed, city).unwrap(), &visits(seed, city)), name);
+        }
+    }
 
     #[test]
     fn every_city_is_a_valid_street_with_seeds_of_its_own() {

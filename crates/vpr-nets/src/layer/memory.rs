@@ -9,9 +9,9 @@ use burn::{
 
 /// A contiguous f32 tensor on the CPU.
 #[derive(Clone, Debug)]
-pub(crate) struct Plain(FlexTensor);
+pub(crate) struct InMemory(FlexTensor);
 
-impl Plain {
+impl InMemory {
     /// The tensor's values in order; `None` if it is recorded for gradients, lies on another
     /// device or holds other numbers.
     pub(crate) fn new<const D: usize>(tensor: &Tensor<D>) -> Option<Self> {
@@ -41,20 +41,20 @@ impl Plain {
 
 /// A contiguous f32 tensor on the CPU whose values are written in place.
 #[derive(Debug)]
-pub(crate) struct PlainMut {
+pub(crate) struct InMemoryMut {
     tensor: FlexTensor,
     device: Device,
 }
 
-impl PlainMut {
+impl InMemoryMut {
     /// Takes the tensor; its values are copied if others hold them too.
     ///
     /// # Panics
     ///
-    /// Where [`Plain::new`] gives `None`.
+    /// Where [`InMemory::new`] gives `None`.
     pub(crate) fn new<const D: usize>(tensor: Tensor<D>) -> Self {
         let device = tensor.device();
-        let Plain(flat) = Plain::new(&tensor).expect("an f32 tensor in memory");
+        let InMemory(flat) = InMemory::new(&tensor).expect("an f32 tensor in memory");
         drop(tensor);
         // A view of a part of the memory gets memory of its own.
         let is_whole = flat.layout().start_offset() == 0;
