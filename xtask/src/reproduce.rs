@@ -1,5 +1,6 @@
 //! From ids to experiment files to the chapters' programs.
 #![expect(clippy::print_stdout, reason = "`--list` is data")]
+#![expect(clippy::print_stderr, reason = "a person waits for the build")]
 
 use std::{
     env, fs,
@@ -41,6 +42,9 @@ pub(crate) struct Args {
     /// Measure timings as well; they differ from run to run
     #[arg(long)]
     timings: bool,
+    /// Build networks too, for their rows; pages always have them
+    #[arg(long)]
+    networks: bool,
 }
 
 /// The two keys of an experiment file that matter here.
@@ -91,6 +95,7 @@ fn reproduce(root: &Path, chapter: &str, ids: &[&str], args: &Args) -> anyhow::R
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
     command.current_dir(root).args(["run", "--quiet", "--bin", chapter]);
+    command.args(features(chapter, args));
     command.args(["--", "run"]).args(ids.iter().map(|id| format!("experiments/{id}.toml")));
     let from_here =
         |path: &Path| env::current_dir().context("current folder").map(|it| it.join(path));
@@ -114,6 +119,20 @@ pub(crate) fn workspace_root() -> anyhow::Result<PathBuf> {
     let manifest = env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from);
     let xtask = manifest.unwrap_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")));
     Ok(xtask.parent().context("xtask lies in the workspace")?.to_owned())
+}
+
+/// What cargo is told to build. Chapter 3 has a first table without networks, in minutes; pages have
+/// all that can be computed. All members of the workspace are selected either way, so that what both
+/// need is built once.
+fn features(chapter: &str, args: &Args) -> &'static [&'static str] {
+    let is_page = args.all || args.write || args.check;
+    if chapter != "bench" || is_page || args.networks {
+        return &[];
+    }
+    eprintln!(
+        "note: without networks; `--networks` adds their rows (and some minutes of compiling)"
+    );
+    &["--no-default-features", "--features", "vpr-bench/cli"]
 }
 
 /// Ids of all experiment files, tables before figures, by number.

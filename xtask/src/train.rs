@@ -23,7 +23,7 @@ pub(crate) struct Args {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Network {
-    /// `data/models/default-encoder.safetensors`
+    /// `crates/vpr-nets/models/default-encoder.safetensors`
     DefaultEncoder,
     /// `data/models/btl-default.safetensors`
     Btl,

@@ -31,7 +31,11 @@ const VALIDATE_EVERY: usize = 200;
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The weights to write; the log lands beside them
-    #[arg(long, value_name = "FILE", default_value = "data/models/default-encoder.safetensors")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        default_value = "crates/vpr-nets/models/default-encoder.safetensors"
+    )]
     output: PathBuf,
     /// Folder that keeps rendered worlds
     #[arg(long, env = "VPR_CACHE", value_name = "DIR", default_value = "data/worlds")]

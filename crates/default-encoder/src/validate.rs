@@ -32,7 +32,11 @@ pub(crate) const BATCH: usize = 32;
 #[derive(clap::Args)]
 pub(crate) struct Args {
     /// The weights
-    #[arg(long, value_name = "FILE", default_value = "data/models/default-encoder.safetensors")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        default_value = "crates/vpr-nets/models/default-encoder.safetensors"
+    )]
     weights: PathBuf,
     /// Folder that keeps rendered worlds
     #[arg(long, env = "VPR_CACHE", value_name = "DIR", default_value = "data/worlds")]

@@ -213,7 +213,7 @@ fn match_images(
         #[cfg(not(feature = "networks"))]
         bail!(
             "`{}` is no technique without a network, and this program was built without networks: \
-             add `--features bench/networks` to cargo's flags",
+             add `--features vpr-bench/networks` to cargo's flags",
             args.method
         );
     };

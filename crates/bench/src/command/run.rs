@@ -4,8 +4,11 @@ use bench::study::{self, Context, Study};
 use vpr_report::cli::{self, Bar, Outcome, RunArgs};
 use vpr_study::Sources;
 
+/// The name by which experiment files call this program.
+const CHAPTER: &str = "bench";
+
 pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
-    let experiments = args.open::<Study>(env!("CARGO_PKG_NAME"))?;
+    let experiments = args.open::<Study>(CHAPTER)?;
     let bar = Bar::default();
     let folders = [&*args.data.data, &args.workspace_data()];
     let sources = Sources::new(folders, &args.data.cache, &bar);

@@ -7,8 +7,11 @@ use sue::{
 use vpr_report::cli::{self, Bar, Outcome, RunArgs};
 use vpr_study::Sources;
 
+/// The name by which experiment files call this program.
+const CHAPTER: &str = "sue";
+
 pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
-    let experiments = args.open::<Study>(env!("CARGO_PKG_NAME"))?;
+    let experiments = args.open::<Study>(CHAPTER)?;
     let bar = Bar::default();
     let folders = [&*args.data.data, &args.workspace_data()];
     let corpora = Corpora::new(Sources::new(folders, &args.data.cache, &bar));

@@ -25,7 +25,11 @@ pub(crate) struct TrainArgs {
     /// Which network
     learned: Learned,
     /// Weights of the default network: where BTL starts, STUN's teacher
-    #[arg(long, value_name = "FILE", default_value = "data/models/default-encoder.safetensors")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        default_value = "crates/vpr-nets/models/default-encoder.safetensors"
+    )]
     from: PathBuf,
     /// The weights to write; the log lands beside them [default:
     /// data/models/<NETWORK>-default.safetensors]

@@ -1,4 +1,4 @@
-//! The published checkpoints by name: `data/weights.toml`.
+//! The published checkpoints by name: `weights.toml`.
 
 use std::{
     fmt,
@@ -12,8 +12,7 @@ use super::{Channels, Interpolation, Preprocessing, Size};
 use crate::{Result, weights::Weights};
 
 /// The weights every clone has (2.6 MB).
-const DEFAULT_ENCODER: &[u8] =
-    include_bytes!("../../../../data/models/default-encoder.safetensors");
+const DEFAULT_ENCODER: &[u8] = include_bytes!("../../models/default-encoder.safetensors");
 
 /// Where weights are.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,7 +32,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// One entry of `data/weights.toml`.
+/// One entry of `weights.toml`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Method {
@@ -156,8 +155,8 @@ struct Registry {
 /// Never: the file is part of the program and tested.
 #[must_use]
 pub fn methods() -> Vec<Method> {
-    let text = include_str!("../../../../data/weights.toml");
-    toml::from_str::<Registry>(text).expect("data/weights.toml is tested").method
+    let text = include_str!("../../weights.toml");
+    toml::from_str::<Registry>(text).expect("weights.toml is tested").method
 }
 
 impl Method {
