@@ -19,7 +19,7 @@ fn workspace() -> PathBuf {
 fn bench(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
     command.current_dir(workspace()).args(arguments).env_remove("VPR_DATA");
-    command.env("VPR_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("worlds"));
+    command.env("VPR_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("bench-cli"));
     command
 }
 

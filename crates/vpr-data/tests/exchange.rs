@@ -181,7 +181,7 @@ fn formats_without_orientation_are_not_given_one() {
 
 fn data(place: &str) -> Option<PathBuf> {
     let Some(root) = std::env::var_os("VPR_DATA") else {
-        eprintln!("VPR_DATA is not set: real files are not read");
+        eprintln!("skipped: VPR_DATA is not set, real files are not read");
         return None;
     };
     Some(Path::new(&root).join(place))

@@ -171,3 +171,97 @@ pub(crate) fn listed(folder: &Path, differences: &[Difference]) -> String {
     let lines: String = differences.iter().map(|it| format!("\n{it}")).collect();
     format!("{}: a run with other settings:{lines}", folder.display())
 }
+
+#[cfg(test)]
+mod tests {
+    use burn::{
+        module::Module,
+        nn::{Linear, LinearConfig},
+        tensor::{Device, Tensor},
+    };
+
+    use super::*;
+    use crate::train::{Optimizer, Schedule, seeded};
+
+    /// One linear layer over the mean colour of an image; its loss pulls places apart.
+    #[derive(Module, Debug)]
+    struct Tiny {
+        layer: Linear,
+    }
+
+    impl Trainable for Tiny {
+        fn loss(&self, images: Tensor<4>, places: &[usize]) -> Tensor<1> {
+            let n = places.len();
+            let colours = images.mean_dim(3).mean_dim(2).reshape([n, 3]);
+            let wanted: Vec<f32> = places.iter().map(|&place| place as f32).collect();
+            let wanted = Tensor::<1>::from_floats(&wanted[..], &Device::flex().autodiff());
+            let found = self.layer.forward(colours).reshape([n]);
+            (found - wanted).square().mean()
+        }
+    }
+
+    const STEPS: usize = 6;
+
+    fn fresh() -> Tiny {
+        let layer = LinearConfig::new(3, 1).init(&Device::flex().autodiff());
+        seeded(Tiny { layer }, 3)
+    }
+
+    fn batch(step: usize) -> Batch {
+        let images = (0..2 * 3 * 4).map(|value| ((value * 7 + step) % 11) as f32 / 11.0).collect();
+        Batch { images, size: (2, 2), places: vec![0, 1] }
+    }
+
+    fn descent() -> Descent {
+        let schedule = Schedule::Cosine { rate: 0.1, last: 0.01, warmup: 2, steps: STEPS };
+        let optimizer = Optimizer::AdamW { decay: 0.01 };
+        Descent { steps: STEPS, schedule, optimizer, save_every: 2 }
+    }
+
+    fn facts(rate: &str) -> Vec<(&'static str, String)> {
+        vec![("rate", rate.to_owned()), ("seed", "3".to_owned())]
+    }
+
+    fn open(folder: &Path, rate: &str) -> Result<Run> {
+        Run::open(
+            &folder.join("run"),
+            &facts(rate),
+            Log::new(&folder.join("log.csv"), &["loss"], 1),
+        )
+    }
+
+    /// Trains until the batch of `last` is asked for, which fails as a kill would.
+    fn train(folder: &Path, last: usize) -> Result<Vec<f32>> {
+        let cells = |report: &Report, _: &Tiny| Ok(vec![format!("{:.6}", report.loss)]);
+        let batch = |step| match step {
+            step if step == last => Err(CoreError::Empty("power")),
+            step => Ok(batch(step)),
+        };
+        let network = open(folder, "0.1")?.descend(&descent(), fresh(), batch, cells)?;
+        Ok(network.layer.weight.val().into_data().try_to_vec().unwrap())
+    }
+
+    #[test]
+    fn a_killed_run_goes_on_to_the_same_bits_and_the_same_log() {
+        let (whole, killed) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let expected = train(whole.path(), STEPS).unwrap();
+        // Killed after a checkpoint and a line that has none, twice.
+        assert!(train(killed.path(), 3).is_err());
+        assert!(train(killed.path(), 5).is_err());
+        assert_eq!(train(killed.path(), STEPS).unwrap(), expected);
+        let log = |folder: &Path| fs::read_to_string(folder.join("log.csv")).unwrap();
+        assert_eq!(log(killed.path()), log(whole.path()));
+        assert_eq!(log(whole.path()).lines().count(), 1 + STEPS);
+    }
+
+    #[test]
+    fn other_settings_are_listed_and_an_open_folder_is_held() {
+        let folder = tempfile::tempdir().unwrap();
+        let held = open(folder.path(), "0.1").unwrap();
+        assert!(open(folder.path(), "0.1").is_err(), "two processes in one folder");
+        drop(held);
+        open(folder.path(), "0.1").unwrap();
+        let err = open(folder.path(), "0.2").unwrap_err().to_string();
+        assert!(err.contains("\nrate: was 0.1, now 0.2") && !err.contains("seed"), "{err}");
+    }
+}
