@@ -16,7 +16,11 @@ use vpr_core::{
     },
 };
 
-use crate::{Recipe, World, recipe_with};
+use crate::{
+    catalog::recipe_with,
+    recipe::{self, Recipe},
+    world::{World, hex},
+};
 
 /// What the names of generated datasets begin with.
 const PREFIX: &str = "world/";
@@ -54,9 +58,9 @@ pub fn named_recipe(id: &str) -> Result<Recipe> {
 pub fn entry(id: &str) -> Result<DatasetEntry> {
     let recipe = named_recipe(id)?;
     let layout = match recipe.layout {
-        crate::Layout::VprBench => Layout::VprBench,
-        crate::Layout::Utm => Layout::UtmNames,
-        crate::Layout::SevenScenes => Layout::SevenScenes,
+        recipe::Layout::VprBench => Layout::VprBench,
+        recipe::Layout::Utm => Layout::UtmNames,
+        recipe::Layout::SevenScenes => Layout::SevenScenes,
     };
     Ok(DatasetEntry {
         id: id.to_owned(),
@@ -67,8 +71,8 @@ pub fn entry(id: &str) -> Result<DatasetEntry> {
         queries: None,
         references: None,
         tolerance: match recipe.tolerance {
-            crate::Tolerance::Frames(frames) => Tolerance::Frames(frames),
-            crate::Tolerance::RadiusM(radius) => Tolerance::Metres(radius),
+            recipe::Tolerance::Frames(frames) => Tolerance::Frames(frames),
+            recipe::Tolerance::RadiusM(radius) => Tolerance::Metres(radius),
         },
         spacing_m: None,
         frames: None,
@@ -141,7 +145,7 @@ fn unpack(entry: &DatasetEntry, folder: &Path, cache: &Path) -> Result<Dataset> 
     for side in [&pairs.references, &pairs.queries] {
         digest.update(side.as_standard_layout().as_slice().unwrap_or_default());
     }
-    let short = crate::world::hex(&digest.finalize()[..8]);
+    let short = hex(&digest.finalize()[..8]);
     let root = cache.join(format!("{}-{short}", entry.id));
     let queries = unpack_side(&pairs.queries, &pairs.frames, &root.join("query"))?;
     let references = unpack_side(&pairs.references, &pairs.frames, &root.join("ref"))?;

@@ -17,10 +17,10 @@ use sha2::{Digest, Sha256};
 use vpr_core::{Error, Poses, Result, dataset::Dataset, npy};
 
 use crate::{
-    family::{Plan, SevenScenes, Shot, plan, truth},
+    family::{Plan, Shot, plan, truth},
     layout::{self, Side},
     overlap::{self, Survey},
-    recipe::Recipe,
+    recipe::{Recipe, SevenScenes},
     render::{Exposure, View, render},
 };
 
