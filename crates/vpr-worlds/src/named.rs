@@ -14,6 +14,7 @@ use vpr_core::{
         DataRoots, Dataset, DatasetEntry, Layout, Manifest, Tolerance,
         layout::npz_images::FramePairs,
     },
+    map::replace,
 };
 
 use crate::{
@@ -165,9 +166,7 @@ fn unpack_side(images: &Array3<u8>, frames: &[usize], folder: &Path) -> Result<V
         let bytes = encode(&levels, width, height)
             .map_err(|cause| Error::format(&path, "image", cause.to_string()))?;
         if fs::read(&path).ok().as_ref() != Some(&bytes) {
-            let mut file = tempfile::NamedTempFile::new_in(folder).map_err(Error::io(folder))?;
-            std::io::Write::write_all(&mut file, &bytes).map_err(Error::io(&path))?;
-            file.persist(&path).map_err(|err| Error::io(&path)(err.error))?;
+            replace(&path, &bytes)?;
         }
         paths.push(path);
     }
