@@ -44,6 +44,7 @@ mod material;
 mod named;
 mod noise;
 mod overlap;
+mod partial;
 mod parts;
 mod preview;
 mod recipe;
