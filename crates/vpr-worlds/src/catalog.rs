@@ -86,31 +86,7 @@ pub fn recipe_with(name: &str, settings: &[(&str, &str)]) -> vpr_core::Result<Re
         return Err(Error::Unknown { kind: "world", name: name.to_owned(), known });
     };
     let path = format!("world/{short}");
-    set(text, Path::new(&path), settings)
-}
-
-/// Reads a recipe and sets some of its keys.
-pub(crate) fn set(text: &str, path: &Path, settings: &[(&str, &str)]) -> vpr_core::Result<Recipe> {
-    if settings.is_empty() {
-        return Recipe::parse(text, path);
-    }
-    let malformed = |place: &str, reason: &str| Error::format(path, place, reason);
-    let mut root: toml::Table =
-        toml::from_str(text).map_err(|cause| malformed("recipe", cause.message()))?;
-    for (key, value) in settings {
-        let parsed: toml::Table = toml::from_str(&format!("value = {value}"))
-            .map_err(|cause| malformed(key, cause.message()))?;
-        let mut parts: Vec<&str> = key.split('.').collect();
-        let last = parts.pop().unwrap_or_default();
-        let mut table = &mut root;
-        for part in parts {
-            let entry = table.entry(part).or_insert_with(|| toml::Value::Table(toml::Table::new()));
-            table = entry.as_table_mut().ok_or_else(|| malformed(key, "is not in a table"))?;
-        }
-        table.insert(last.to_owned(), parsed["value"].clone());
-    }
-    let text = toml::to_string(&root).map_err(|cause| malformed("recipe", &cause.to_string()))?;
-    Recipe::parse(&text, path)
+    Recipe::parse_with(text, Path::new(&path), settings)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::recipe::{Refusal, between};
+use crate::refusal::{Refusal, between};
 
 /// Light, weather, season and traffic of one traverse.
 ///

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     material::Colour,
     noise::{lerp, step, value},
-    recipe::{Refusal, between},
+    refusal::{Refusal, between},
     seed::{Seed, cell, mix, normal, unit},
 };
 

@@ -45,13 +45,16 @@ mod material;
 mod named;
 mod noise;
 mod overlap;
+mod partial;
 mod parts;
 mod preview;
 mod recipe;
+mod refusal;
 mod render;
 mod scene;
 mod scenery;
 mod seed;
+mod traverse;
 mod world;
 
 use std::path::Path;
@@ -59,15 +62,17 @@ use std::path::Path;
 pub use camera::Camera;
 pub use catalog::{names, recipe, recipe_with};
 pub use condition::Condition;
-pub use family::{
-    Campus, Grid, Interior, Kind, LIGHTS_DEG, Rail, SevenScenes, Stage, StageKind, Street,
-};
+pub use family::LIGHTS_DEG;
 pub use film::Film;
 pub use layout::Side;
 pub use named::{Worlds, is_world, named_recipe};
 pub use preview::preview;
-pub use recipe::{Layout, Offset, Recipe, Tolerance, Traverse};
+pub use recipe::{
+    Campus, Grid, Interior, Kind, Layout, Rail, Recipe, SevenScenes, Stage, StageKind, Street,
+    Tolerance,
+};
 pub use scenery::{Photograph, Scenery, photograph_city};
+pub use traverse::{Offset, Traverse};
 pub use world::{RENDERER, World};
 
 /// Opens the world called `name` (with or without `world/`), rendering it into `cache` if it is

@@ -1,13 +1,16 @@
 //! The `worlds` program: lists, renders and previews generated places.
 
 use std::{
+    io::Cursor,
     path::{Path, PathBuf},
     process::ExitCode,
 };
 
 use anyhow::Context;
 use clap::{Args as ClapArgs, Parser, Subcommand};
+use image::ImageFormat;
 use vpr_data::DataRoots;
+use vpr_files::replace;
 use vpr_report::cli::{self, Outcome};
 use vpr_worlds::{Recipe, World, names, preview, recipe_with};
 
@@ -92,7 +95,11 @@ fn main() -> ExitCode {
             }
             Command::Preview { which, output, queries } => {
                 let sheet = preview(&which.recipe(&roots)?, queries, 3)?;
-                sheet.save(&output).with_context(|| output.display().to_string())?;
+                let mut bytes = Cursor::new(Vec::new());
+                ImageFormat::from_path(&output)
+                    .and_then(|format| sheet.write_to(&mut bytes, format))
+                    .with_context(|| output.display().to_string())?;
+                replace(&output, bytes.get_ref())?;
                 cli::note(&format!("generated: {}", output.display()));
             }
         }

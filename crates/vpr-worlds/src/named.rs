@@ -8,7 +8,11 @@ use std::{
 use vpr_core::{Error, Observer, Provenance, Result};
 use vpr_data::{DataRoots, Dataset, DatasetEntry, Generator, Layout, Tolerance};
 
-use crate::{Recipe, World, recipe_with};
+use crate::{
+    catalog::recipe_with,
+    recipe::{self, Recipe},
+    world::World,
+};
 
 /// What the names of generated datasets begin with.
 const PREFIX: &str = "world/";
@@ -76,9 +80,9 @@ pub fn named_recipe(id: &str) -> Result<Recipe> {
 fn entry(id: &str) -> Result<DatasetEntry> {
     let recipe = named_recipe(id)?;
     let layout = match recipe.layout {
-        crate::Layout::VprBench => Layout::VprBench,
-        crate::Layout::Utm => Layout::UtmNames,
-        crate::Layout::SevenScenes => Layout::SevenScenes,
+        recipe::Layout::VprBench => Layout::VprBench,
+        recipe::Layout::Utm => Layout::UtmNames,
+        recipe::Layout::SevenScenes => Layout::SevenScenes,
     };
     Ok(DatasetEntry {
         id: id.to_owned(),
@@ -89,8 +93,8 @@ fn entry(id: &str) -> Result<DatasetEntry> {
         queries: None,
         references: None,
         tolerance: match recipe.tolerance {
-            crate::Tolerance::Frames(frames) => Tolerance::Frames(frames),
-            crate::Tolerance::RadiusM(radius) => Tolerance::Metres(radius),
+            recipe::Tolerance::Frames(frames) => Tolerance::Frames(frames),
+            recipe::Tolerance::RadiusM(radius) => Tolerance::Metres(radius),
         },
         spacing_m: None,
         frames: None,

@@ -7,7 +7,8 @@ use vpr_core::{GroundTruth, Pose, Result};
 use crate::{
     family::{Plan, plan, tour, truth},
     layout::{self, Side},
-    recipe::{Recipe, Traverse},
+    recipe::Recipe,
+    traverse::Traverse,
     world::take,
 };
 

@@ -3,7 +3,6 @@
 use std::{
     fs,
     path::{Path, PathBuf},
-    time::Duration,
 };
 
 use image::{
@@ -19,10 +18,11 @@ use vpr_data::Dataset;
 use vpr_files::npy;
 
 use crate::{
-    family::{Plan, SevenScenes, Shot, plan, truth},
+    family::{Plan, Shot, plan, truth},
     layout::{self, Side},
     overlap::{self, Survey},
-    recipe::Recipe,
+    partial::{self, Partial},
+    recipe::{Recipe, SevenScenes},
     render::{Exposure, View, render},
 };
 
@@ -45,11 +45,6 @@ pub struct World {
     pub dataset: Dataset,
 }
 
-/// What the names of folders begin with that are being rendered.
-const PARTIAL: &str = ".partial-";
-/// No render takes as long as this.
-const FORGOTTEN: Duration = Duration::from_hours(24);
-
 /// What must be in a complete folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -67,7 +62,8 @@ impl World {
     ///
     /// A folder is only trusted if its stamp is there and agrees with every file; otherwise it is
     /// removed and rendered again. Rendering writes to a temporary folder beside it and renames
-    /// that at the end, so a killed render or a full disk leaves nothing that would be opened.
+    /// that at the end, so a killed render or a full disk leaves nothing that would be opened; what
+    /// it leaves is removed by the next render in this cache, never what a living process holds.
     ///
     /// # Errors
     ///
@@ -201,10 +197,8 @@ fn write(
     folder: &Path,
     done: &(dyn Fn() + Sync),
 ) -> Result<()> {
-    fs::create_dir_all(cache).map_err(Error::io(cache))?;
-    sweep(cache);
-    let partial =
-        tempfile::Builder::new().prefix(PARTIAL).tempdir_in(cache).map_err(Error::io(cache))?;
+    partial::sweep(cache);
+    let partial = Partial::create(cache)?;
     let root = partial.path();
     let mut plan = plan(recipe)?;
     layout::in_reading_order(recipe.layout, &mut plan);
@@ -226,28 +220,11 @@ fn write(
     let json = serde_json::to_vec_pretty(&stamp)
         .map_err(|cause| Error::format(root, STAMP, cause.to_string()))?;
     save(&root.join(STAMP), &json)?;
-    match fs::rename(root, folder) {
-        Ok(()) => {
-            // The folder has moved: there is nothing left to clean up.
-            let _ = partial.keep();
-            Ok(())
-        }
+    match partial.publish(folder) {
+        Ok(()) => Ok(()),
         // Somebody else finished the same world first.
         Err(_) if is_complete(folder)? => Ok(()),
         Err(cause) => Err(Error::io(folder)(cause)),
-    }
-}
-
-/// Removes what renders that were killed long ago have left.
-fn sweep(cache: &Path) {
-    let Ok(entries) = fs::read_dir(cache) else { return };
-    for entry in entries.flatten() {
-        let is_partial = entry.file_name().to_string_lossy().starts_with(PARTIAL);
-        let age = entry.metadata().and_then(|data| data.modified()).map(|time| time.elapsed());
-        if is_partial && matches!(age, Ok(Ok(age)) if age > FORGOTTEN) {
-            // Somebody else may be removing it too; what stays is never opened.
-            let _ = fs::remove_dir_all(entry.path());
-        }
     }
 }
 
@@ -305,6 +282,7 @@ fn encode_depth(exposure: &Exposure, shot: &Shot, unit: f64) -> image::ImageResu
     Ok(bytes)
 }
 
+/// Writes a file of a folder under construction: it need not be safe, the folder appears as a whole.
 fn save(path: &Path, bytes: &[u8]) -> Result<()> {
     if let Some(parent) = path.parent() {
         fs::create_dir_all(parent).map_err(Error::io(parent))?;

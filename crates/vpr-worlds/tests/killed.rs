@@ -4,8 +4,8 @@
 
 use std::{
     fs,
-    path::Path,
-    process::{Command, Stdio},
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
     thread::sleep,
     time::{Duration, Instant},
 };
@@ -42,6 +42,59 @@ fn folders(cache: &Path) -> Vec<String> {
     entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect()
 }
 
+/// The folder of a render that is not finished.
+fn partial(cache: &Path) -> Option<PathBuf> {
+    let paths = fs::read_dir(cache).into_iter().flatten().map(|entry| entry.unwrap().path());
+    let name = |path: &Path| path.file_name().unwrap().to_string_lossy().into_owned();
+    paths.filter(|path| path.is_dir()).find(|path| name(path).starts_with(".partial-"))
+}
+
+/// A render that has begun to write, and its folder; it goes on for long.
+fn begun(cache: &Path) -> (Child, PathBuf) {
+    let child = render(cache).args(["--set", "places=400"]).spawn().unwrap();
+    let limit = Instant::now() + Duration::from_secs(60);
+    loop {
+        assert!(Instant::now() < limit, "nothing was written");
+        if let Some(folder) = partial(cache)
+            && folder.join("ref").is_dir()
+        {
+            return (child, folder);
+        }
+        sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn what_a_killed_render_leaves_is_removed_by_the_next_of_any_world() {
+    let cache = tempfile::tempdir().unwrap();
+    let (mut child, left) = begun(cache.path());
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(left.is_dir());
+    // Another world: it has fewer places.
+    stamp(cache.path());
+    assert!(!left.exists());
+    assert_eq!(folders(cache.path()).len(), 1, "{:?}", folders(cache.path()));
+}
+
+#[test]
+fn what_a_living_render_holds_is_left_to_it() {
+    let cache = tempfile::tempdir().unwrap();
+    let (mut child, held) = begun(cache.path());
+    // Stopped, it cannot finish meanwhile; it lives all the same.
+    let signal = |name: &str| {
+        let status = Command::new("kill").args([name, &child.id().to_string()]).status();
+        assert!(status.unwrap().success());
+    };
+    signal("-STOP");
+    stamp(cache.path());
+    let is_left = held.join("ref").is_dir();
+    signal("-CONT");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(is_left);
+}
+
 #[test]
 fn a_render_killed_at_any_moment_leaves_nothing_that_is_trusted() {
     let clean = tempfile::tempdir().unwrap();
@@ -61,6 +114,7 @@ fn a_render_killed_at_any_moment_leaves_nothing_that_is_trusted() {
             assert!(is_partial || cache.path().join(&name).join("world.json").exists(), "{name}");
         }
         assert_eq!(stamp(cache.path()), expected, "killed after {moment} tenths");
+        assert_eq!(partial(cache.path()), None, "killed after {moment} tenths");
     }
     assert!(n_killed >= 3, "only {n_killed} of 12 renders were killed in time");
 }

@@ -1,7 +1,6 @@
 //! Corridors, rows of rooms, and a station's escalators.
 
 use glam::{Vec2, Vec3};
-use serde::{Deserialize, Serialize};
 
 use super::{Plan, beside, level_pose, looking_at, two_traverses};
 use crate::{
@@ -9,56 +8,11 @@ use crate::{
     light::Light,
     material::{Material, rgb},
     parts::{Furnisher, INDOORS, Room, StreetKit, hide_behind, shell},
-    recipe::{Offset, Recipe, Refusal, Traverse, between, count},
+    recipe::{Interior, Kind, Recipe},
     scene::{Draft, Lamp, Scene},
     seed::Seed,
+    traverse::{Offset, Traverse},
 };
-
-/// Places indoors.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Interior {
-    /// What is built.
-    pub kind: Kind,
-    /// Distance between places, metres.
-    pub spacing_m: f64,
-    /// Width of a corridor, metres.
-    pub width_m: f64,
-    /// Share of wall places that stay empty.
-    pub blank: f64,
-    /// Share of sections that look like one of two models.
-    pub aliasing: f64,
-    /// Places in each room (`rooms` only).
-    pub places_per_room: usize,
-    /// Camera height above the floor, metres.
-    pub eye_m: f64,
-}
-
-/// What kind of interior.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Kind {
-    /// One long corridor.
-    Corridor,
-    /// Room after room.
-    Rooms,
-    /// Two parallel escalators up through a station, lanes 1.8 m apart.
-    Escalator,
-}
-
-impl Default for Interior {
-    fn default() -> Self {
-        Self {
-            kind: Kind::Corridor,
-            spacing_m: 0.6,
-            width_m: 2.4,
-            blank: 0.35,
-            aliasing: 0.0,
-            places_per_room: 12,
-            eye_m: 1.4,
-        }
-    }
-}
 
 /// Length of a stretch of corridor with one look.
 const SECTION: f32 = 9.5;
@@ -68,15 +22,6 @@ const LANES: f32 = 1.8;
 const RISE: f32 = 0.577;
 
 impl Interior {
-    pub(crate) fn check(&self) -> Result<(), Refusal> {
-        between("interior.spacing_m", self.spacing_m, 0.02, 20.0)?;
-        between("interior.width_m", self.width_m, 1.2, 12.0)?;
-        between("interior.blank", self.blank, 0.0, 1.0)?;
-        between("interior.aliasing", self.aliasing, 0.0, 1.0)?;
-        count("interior.places_per_room", self.places_per_room, 2, 500)?;
-        between("interior.eye_m", self.eye_m, 0.05, 2.2)
-    }
-
     pub(crate) fn plan(&self, recipe: &Recipe, seed: Seed) -> Plan {
         let steps = recipe.steps(self.spacing_m);
         let n = steps.last().map_or(0, |last| last + 1);

@@ -1,18 +1,16 @@
 //! The families of worlds: each turns its table of a recipe into scenes and shots.
 
 mod campus;
+mod city;
 mod interior;
+mod lineside;
 mod rail;
 mod seven_scenes;
 mod stage;
 mod street;
+mod track;
 
-pub use campus::Campus;
-pub use interior::{Interior, Kind};
-pub use rail::Rail;
-pub use seven_scenes::SevenScenes;
-pub use stage::{LIGHTS_DEG, Stage, StageKind};
-pub use street::{Grid, Street};
+pub use stage::LIGHTS_DEG;
 
 use glam::Vec3;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -22,9 +20,10 @@ use crate::{
     camera::Camera,
     film::Film,
     light::Light,
-    recipe::{Offset, Recipe, Tolerance, Traverse},
+    recipe::{Recipe, Tolerance},
     scene::{Lamp, Scene, Shape},
     seed::Seed,
+    traverse::{Offset, Traverse},
 };
 
 /// Everything that is needed to render a world.

@@ -2,45 +2,17 @@
 
 use glam::{Vec2, Vec3};
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
 
-use super::{Plan, Shot, Street, beside, looking_at};
+use super::{Plan, Shot, beside, looking_at};
 use crate::{
     geometry::Ray,
     light::Light,
     parts::{Furnisher, Room, shell, toy_town},
-    recipe::{Offset, Recipe},
+    recipe::{Recipe, Stage, StageKind, Street},
     scene::{Draft, Lamp, Scene},
     seed::Seed,
+    traverse::Offset,
 };
-
-/// One of the setups of section 3.2.5.
-///
-/// The one reference is the first place, unvaried; the queries are first all variations of it and
-/// then the same variations of the other place, for which nothing is correct. A curve of figures
-/// 3.19 to 3.21 is the score of either half against the reference.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Stage {
-    /// Which setup, and what varies in it.
-    pub kind: StageKind,
-}
-
-/// The setups.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum StageKind {
-    /// Point Features: every viewpoint under every light, 4 522 images.
-    LightStage,
-    /// Point Features: 119 viewpoints of a toy town under its first light.
-    LightStageViewpoints,
-    /// Point Features: the 19 lights of table 3.4 seen from the first viewpoint.
-    LightStageLights,
-    /// QUT multi-lane: five lanes 1.2 m apart, three steps of 3.5 m.
-    MultiLane,
-    /// MIT multi-illumination: 25 directions of a flash that bounces off walls and ceiling.
-    MultiIllumination,
-}
 
 /// Azimuth and elevation of the lights of table 3.4, degrees. The table's caption names the two
 /// angles the other way round than its values allow: no elevation is 264°.

@@ -1,140 +1,30 @@
-//! City blocks along avenues: houses, shops, trees, cars, people.
+//! The drive along the avenues of a city: its route, its visits, and the views around it.
 
-use glam::{Vec2, Vec3};
-use serde::{Deserialize, Serialize};
+use glam::Vec3;
 
-use super::{Plan, Shot, drive, level_pose, two_traverses};
+use super::{
+    Plan, Shot,
+    city::{AVENUES, City},
+    drive, level_pose, two_traverses,
+};
 use crate::{
-    geometry::Geometry,
     light::Light,
-    material::{Material, Roads, rgb},
-    parts::{Grove, Lot, OUTDOORS, Species, StreetKit, Style, hide_behind, house},
-    recipe::{Offset, Recipe, Refusal, Traverse, between, count},
-    scene::{Draft, Scene},
+    parts::{OUTDOORS, hide_behind},
+    recipe::{Grid, Recipe, Street},
     seed::Seed,
+    traverse::{Offset, Traverse},
 };
 
-/// A city whose avenues run north (+y) and are driven northwards, one after the other.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Street {
-    /// Parallel avenues the route drives.
-    pub avenues: usize,
-    /// Distance between places, metres.
-    pub spacing_m: f64,
-    /// How unevenly the places lie: the drive is slower and faster by this share in turn, below 1.
-    #[serde(skip_serializing_if = "is_even")]
-    pub uneven: f64,
-    /// Distance between cross streets, metres.
-    #[serde(skip_serializing_if = "is_usual_block")]
-    pub block_m: f64,
-    /// Width of the roads between their kerbs, metres.
-    #[serde(skip_serializing_if = "is_usual_road")]
-    pub road_m: f64,
-    /// How many kinds of houses there are.
-    pub styles: usize,
-    /// How many places share a look where `aliasing` has its way: 1 none.
-    pub look_alikes: usize,
-    /// Share of lots that repeat with the look-alikes.
-    pub aliasing: f64,
-    /// Share of places along the kerb that have a tree.
-    pub trees: f64,
-    /// Camera height above the road.
-    pub eye_m: f64,
-    /// Camera direction, degrees counter-clockwise from the direction of travel.
-    pub heading_deg: f64,
-    /// Further views on a grid around the references' route.
-    pub grid: Option<Grid>,
-}
-
-/// True images at the places of a densified map: `rows` beside each other across the route and
-/// `columns` along it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Grid {
-    /// Number of places across the route.
-    pub rows: usize,
-    /// Number of places along the route.
-    pub columns: usize,
-    /// Distance between them, metres.
-    pub step_m: f64,
-}
-
-impl Default for Street {
-    fn default() -> Self {
-        Self {
-            avenues: 3,
-            spacing_m: 6.0,
-            uneven: 0.0,
-            block_m: BLOCK,
-            road_m: ROAD,
-            styles: 10,
-            look_alikes: 1,
-            aliasing: 0.0,
-            trees: 0.45,
-            eye_m: 1.9,
-            heading_deg: 25.0,
-            grid: None,
-        }
-    }
-}
-
-/// Distance between avenues, metres.
-const AVENUES: f32 = 68.0;
-/// Usual distance between cross streets.
-const BLOCK: f64 = 92.0;
-/// Usual width between kerbs.
-const ROAD: f64 = 11.2;
-const SIDEWALK: f32 = 3.2;
-const KERB: f32 = 0.13;
-/// Blocks beyond the route on all sides.
-const MARGIN: i64 = 2;
 /// Places from one slow stretch of an uneven drive to the next.
 const SLOW_EVERY: f64 = 24.0;
 
-// Keys that came later are only written where they differ: recipes without them keep their folders.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls these")]
-fn is_even(uneven: &f64) -> bool {
-    *uneven == 0.0
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls these")]
-fn is_usual_block(block: &f64) -> bool {
-    *block == BLOCK
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde calls these")]
-fn is_usual_road(road: &f64) -> bool {
-    *road == ROAD
-}
-
 impl Street {
-    pub(crate) fn check(&self) -> Result<(), Refusal> {
-        count("street.avenues", self.avenues, 1, 40)?;
-        count("street.styles", self.styles, 1, 200)?;
-        count("street.look_alikes", self.look_alikes, 1, 1_000)?;
-        between("street.spacing_m", self.spacing_m, 0.2, 200.0)?;
-        between("street.uneven", self.uneven, 0.0, 0.95)?;
-        between("street.block_m", self.block_m, 60.0, 400.0)?;
-        between("street.road_m", self.road_m, 9.0, 20.0)?;
-        between("street.aliasing", self.aliasing, 0.0, 1.0)?;
-        between("street.trees", self.trees, 0.0, 1.0)?;
-        between("street.eye_m", self.eye_m, 0.3, 6.0)?;
-        if let Some(grid) = self.grid {
-            count("street.grid.rows", grid.rows, 1, 200)?;
-            count("street.grid.columns", grid.columns, 1, 200)?;
-            between("street.grid.step_m", grid.step_m, 0.01, 50.0)?;
-        }
-        between("street.heading_deg", self.heading_deg, -180.0, 180.0)
-    }
-
     pub(crate) fn plan(&self, recipe: &Recipe, seed: Seed) -> Plan {
         let route = self.route(recipe);
         let last = recipe.steps(self.slowest_m()).last().copied().unwrap_or_default();
         let mut city = City::new(self, last + 1, seed);
         // New places may lie on avenues of their own.
-        let last_avenue = (last / self.per_avenue(recipe.places)) as i64;
-        city.avenues = city.avenues.max(last_avenue + 1 - MARGIN);
+        city.reach((last / self.per_avenue(recipe.places)) as i64);
         let (first, _) = city.build(&recipe.references, 0);
         let (second, kit) = city.build(&recipe.queries, 1);
         let (references, queries) = two_traverses(recipe, &route, seed, |pose, own| {
@@ -232,237 +122,8 @@ impl Street {
         self.spacing_m * (1.0 - self.uneven)
     }
 
-    fn period(&self) -> Vec2 {
-        Vec2::new(AVENUES, self.block_m as f32)
-    }
-
-    fn per_avenue(&self, places: usize) -> usize {
+    /// Places along one avenue of a route with so many places.
+    pub(crate) fn per_avenue(&self, places: usize) -> usize {
         places.div_ceil(self.avenues)
-    }
-}
-
-/// What lasts in a city, whoever drives through it.
-struct City<'a> {
-    street: &'a Street,
-    avenues: i64,
-    blocks: i64,
-    /// Blocks along an avenue until the look repeats.
-    cycle: i64,
-    styles: Vec<Style>,
-    seed: Seed,
-}
-
-impl<'a> City<'a> {
-    fn new(street: &'a Street, places: usize, seed: Seed) -> Self {
-        let per_avenue = street.per_avenue(places);
-        let length = per_avenue as f64 * street.spacing_m;
-        let blocks = (length / street.block_m).ceil() as i64;
-        let cycle = (blocks / street.look_alikes as i64).max(1);
-        let styles =
-            (0..street.styles as i64).map(|k| Style::new(seed.named("style").at(k))).collect();
-        Self { street, avenues: street.avenues as i64 + 1, blocks, cycle, styles, seed }
-    }
-
-    /// The seed of a thing in a block: its own, or the one that all look-alikes share.
-    fn look(&self, avenue: i64, block: i64, thing: i64) -> Seed {
-        let own = self.seed.named("look").at(avenue).at(block).at(thing);
-        let repeats =
-            self.street.look_alikes > 1 && own.named("repeats").chance(self.street.aliasing as f32);
-        if !repeats {
-            return own;
-        }
-        self.seed.named("look").at(avenue).at(block.rem_euclid(self.cycle)).at(thing)
-    }
-
-    /// Blocks before and after the route: look-alikes must not be told apart by the city's end.
-    fn beyond(&self) -> i64 {
-        if self.street.look_alikes > 1 { 6 } else { MARGIN }
-    }
-
-    fn build(&self, traverse: &Traverse, number: i64) -> (Scene, StreetKit) {
-        let mut draft = Draft::default();
-        let kit = StreetKit::new(&mut draft, self.seed.named("kit"));
-        let grove =
-            Grove::new(&mut draft, self.seed.named("grove"), traverse.condition.bare as f32);
-        let (period, road) = (self.street.period(), 0.5 * self.street.road_m as f32);
-        let roads = draft.material(Material::Roads(Roads { period, half_width: road }));
-        let pavement = draft.material(Material::Pavement { colour: rgb(150, 147, 140) });
-        let meadow = draft.material(Material::Meadow { colour: rgb(86, 112, 52) });
-        let far = Vec3::new(-3_000.0, -3_000.0, -0.06);
-        let plain = Geometry::Patch { corner: far, u: Vec3::X * 6_500.0, v: Vec3::Y * 6_500.0 };
-        draft.add(plain, meadow, 1);
-        let builder =
-            Block { city: self, kit: &kit, grove: &grove, traverse, number, pavement, meadow };
-        for avenue in -MARGIN..self.avenues + MARGIN {
-            for block in -self.beyond()..self.blocks + self.beyond() {
-                let corner = Vec2::new(avenue as f32, block as f32) * period;
-                let low = (corner - Vec2::splat(road + 30.0)).extend(0.0);
-                let road =
-                    Geometry::Patch { corner: low, u: Vec3::X * period.x, v: Vec3::Y * period.y };
-                draft.add(road, roads, self.look(avenue, block, 0).bits());
-                builder.build(&mut draft, avenue, block);
-            }
-        }
-        (Scene::new(draft), kit)
-    }
-}
-
-/// Builds the block to the north-east of a crossing.
-struct Block<'a> {
-    city: &'a City<'a>,
-    kit: &'a StreetKit,
-    grove: &'a Grove,
-    traverse: &'a Traverse,
-    number: i64,
-    pavement: u32,
-    meadow: u32,
-}
-
-impl Block<'_> {
-    fn build(&self, draft: &mut Draft, avenue: i64, block: i64) {
-        let (period, road) =
-            (self.city.street.period(), Vec2::splat(0.5 * self.city.street.road_m as f32));
-        let corner = Vec2::new(avenue as f32, block as f32) * period;
-        let low = (corner + road).extend(-0.2);
-        let high = (corner + period - road).extend(KERB);
-        draft.add(
-            Geometry::span(low, high),
-            self.pavement,
-            self.city.look(avenue, block, 1).bits(),
-        );
-        let inner_low = low + Vec3::new(SIDEWALK, SIDEWALK, 0.0);
-        let inner_high = high - Vec3::new(SIDEWALK, SIDEWALK, -0.02);
-        draft.add(
-            Geometry::span(inner_low, inner_high),
-            self.meadow,
-            self.city.look(avenue, block, 2).bits(),
-        );
-        for (side, front) in [(-1.0, inner_low.x), (1.0, inner_high.x)] {
-            self.row(draft, (avenue, block), side, front, (inner_low.y, inner_high.y));
-            let kerb = if side < 0.0 { low.x } else { high.x };
-            self.kerb(draft, (avenue, block), side, kerb, (low.y, high.y));
-        }
-        let yard = self.city.look(avenue, block, 3);
-        for tree in 0..5 {
-            let own = yard.at(tree);
-            let foot = Vec3::new(
-                own.at(0).range(inner_low.x + 16.0, inner_high.x - 16.0),
-                own.at(1).range(inner_low.y + 3.0, inner_high.y - 3.0),
-                KERB,
-            );
-            self.grove.plant(
-                draft,
-                own.at(2).pick(&[Species::Broad, Species::Conifer]),
-                foot,
-                own.at(3).range(6.0, 12.0),
-                own,
-            );
-        }
-    }
-
-    /// One side of a block: lot after lot.
-    fn row(
-        &self,
-        draft: &mut Draft,
-        (avenue, block): (i64, i64),
-        side: f32,
-        front: f32,
-        span: (f32, f32),
-    ) {
-        let key = if side < 0.0 { 100 } else { 200 };
-        let cut = self.city.look(avenue, block, key);
-        let n_lots = 5 + cut.at(0).index(3) as i64;
-        let mut edge = span.0;
-        for lot in 0..n_lots {
-            let even = (span.1 - span.0) / n_lots as f32;
-            let end = if lot + 1 == n_lots {
-                span.1
-            } else {
-                span.0 + even * (lot as f32 + 1.0 + cut.at(lot + 1).range(-0.28, 0.28))
-            };
-            let look = self.city.look(avenue, block, key + 1 + lot);
-            let ground = Lot {
-                front,
-                span: (edge, end),
-                depth: look.at(60).range(10.0, 15.0),
-                side,
-                level: KERB,
-            };
-            edge = end;
-            if look.at(61).chance(0.1) {
-                self.garden(draft, &ground, look);
-                continue;
-            }
-            let style = &self.city.styles[look.at(62).index(self.city.styles.len())];
-            let changed = look.at(63).chance(self.traverse.condition.changed as f32);
-            let shop = look.named("shop").at(if changed { self.number } else { 0 });
-            house(draft, &ground, style, look, shop);
-        }
-    }
-
-    /// A lot without a house: hedge or wall, trees.
-    fn garden(&self, draft: &mut Draft, lot: &Lot, look: Seed) {
-        let (a, b) = (lot.front, lot.front - lot.side * 0.35);
-        let low = Vec3::new(a.min(b), lot.span.0, KERB);
-        let high = Vec3::new(a.max(b), lot.span.1, KERB + look.at(1).range(0.7, 2.0));
-        draft.add(Geometry::span(low, high), self.pavement, look.bits());
-        for tree in 0..4 {
-            let own = look.at(10 + tree);
-            let foot = Vec3::new(
-                lot.front - lot.side * own.at(0).range(1.0, 9.0),
-                own.at(1).range(lot.span.0, lot.span.1),
-                KERB,
-            );
-            let species =
-                own.at(2).pick(&[Species::Broad, Species::Conifer, Species::Poplar, Species::Bush]);
-            let height = if species == Species::Bush { 2.0 } else { own.at(3).range(4.0, 11.0) };
-            self.grove.plant(draft, species, foot, height, own);
-        }
-    }
-
-    /// Trees, lamps, signs, parked cars and people along one kerb.
-    fn kerb(
-        &self,
-        draft: &mut Draft,
-        (avenue, block): (i64, i64),
-        side: f32,
-        kerb: f32,
-        span: (f32, f32),
-    ) {
-        let key = if side < 0.0 { 300 } else { 400 };
-        let n_slots = ((span.1 - span.0 - 8.0) / 5.5) as i64;
-        let inward = Vec2::new(-side, 0.0);
-        for slot in 0..n_slots {
-            let look = self.city.look(avenue, block, key + slot);
-            let foot = Vec3::new(kerb + inward.x * 0.7, span.0 + 5.0 + 5.5 * slot as f32, KERB);
-            if slot % 4 == 1 {
-                self.kit.lamp(draft, foot, -inward * 1.6, look);
-            } else if look.at(0).chance(self.city.street.trees as f32) {
-                let species = look.at(1).pick(&[Species::Broad, Species::Broad, Species::Poplar]);
-                let shift = Vec3::Y * look.at(2).range(-1.2, 1.2);
-                self.grove.plant(draft, species, foot + shift, look.at(3).range(4.5, 9.5), look);
-            } else if look.at(4).chance(0.3) {
-                self.kit.sign(draft, foot, look.at(5).pick(&[0.0, 1.571, 0.4]), look);
-            } else if look.at(6).chance(0.5) {
-                self.kit.small_thing(draft, foot, look);
-            }
-            let now =
-                self.city.seed.named("traffic").at(self.number).at(avenue).at(block).at(key + slot);
-            let traffic = self.traverse.condition.traffic as f32;
-            if now.at(0).chance(traffic) && slot > 0 {
-                let at =
-                    Vec3::new(kerb - inward.x * 1.05, foot.y + now.at(1).range(-0.5, 0.5), 0.0);
-                let angle = std::f32::consts::FRAC_PI_2 * if side < 0.0 { -1.0 } else { 1.0 };
-                self.kit.car(draft, at, angle, now);
-            }
-            if now.at(3).chance(0.3 * traffic) {
-                let at = Vec3::new(
-                    kerb + inward.x * now.at(4).range(1.0, 2.8),
-                    foot.y + now.at(5).range(-2.5, 2.5),
-                    KERB,
-                );
-                self.kit.person(draft, at, now.at(6));
-            }
-        }
     }
 }

@@ -3,6 +3,7 @@
 use glam::{Vec2, Vec3};
 
 use crate::{
+    camera::Camera,
     geometry::Geometry,
     material::{Material, hue, rgb},
     scene::{Draft, Lamp, Shape},
@@ -229,7 +230,7 @@ pub(crate) const INDOORS: f64 = 0.6;
 /// to the top, so the share is exact up to half a column of [`COLUMNS`].
 pub(crate) fn hide_behind(
     kit: &StreetKit,
-    (pose, camera): (&vpr_core::Pose, &crate::Camera),
+    (pose, camera): (&vpr_core::Pose, &Camera),
     share: f64,
     depth: f64,
     seed: Seed,

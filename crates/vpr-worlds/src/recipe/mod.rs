@@ -1,16 +1,29 @@
-//! Recipes: worlds as data, checked before anything is built.
+//! Recipes: worlds as data, checked before anything is built; one file per family table.
+
+mod campus;
+mod interior;
+mod rail;
+mod settings;
+mod seven_scenes;
+mod stage;
+mod street;
 
 use std::path::Path;
 
+pub use campus::Campus;
+pub use interior::{Interior, Kind};
+pub use rail::Rail;
 use serde::{Deserialize, Serialize};
+pub use seven_scenes::SevenScenes;
+pub use stage::{Stage, StageKind};
+pub use street::{Grid, Street};
 use vpr_core::Error;
 use vpr_data::DataRoots;
 
 use crate::{
     camera::Camera,
-    condition::Condition,
-    family::{Campus, Interior, Rail, SevenScenes, Stage, Street},
-    film::Film,
+    refusal::{Refusal, between, count},
+    traverse::Traverse,
 };
 
 /// A world: which places, seen how, written in which layout.
@@ -95,42 +108,6 @@ pub enum Tolerance {
     RadiusM(f64),
 }
 
-/// One pass through a world.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Traverse {
-    /// Light, weather, season, traffic.
-    pub condition: Condition,
-    /// Sensor and print.
-    pub film: Film,
-    /// Where the camera is beside the route.
-    pub offset: Offset,
-}
-
-/// The camera against the place it belongs to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Offset {
-    /// To the right of the route.
-    pub lateral_m: f64,
-    /// Along the route.
-    pub forward_m: f64,
-    /// Above the usual height.
-    pub up_m: f64,
-    /// To the left (counter-clockwise from above).
-    pub yaw_deg: f64,
-    /// Upwards.
-    pub pitch_deg: f64,
-    /// Largest random part of the five above, as a share of 1 m and 10°; drawn per image.
-    pub jitter: f64,
-}
-
-/// A number or key that a recipe must not have.
-pub(crate) struct Refusal {
-    pub(crate) key: &'static str,
-    pub(crate) reason: String,
-}
-
 /// The line of a byte, and the key that line sets.
 fn place(text: &str, at: usize) -> String {
     let before = text.get(..at).unwrap_or(text);
@@ -144,25 +121,6 @@ fn place(text: &str, at: usize) -> String {
 
 fn one() -> usize {
     1
-}
-
-pub(crate) fn between(key: &'static str, value: f64, low: f64, high: f64) -> Result<(), Refusal> {
-    if (low..=high).contains(&value) {
-        return Ok(());
-    }
-    Err(Refusal { key, reason: format!("{value} is not within {low} to {high}") })
-}
-
-pub(crate) fn count(
-    key: &'static str,
-    value: usize,
-    low: usize,
-    high: usize,
-) -> Result<(), Refusal> {
-    if (low..=high).contains(&value) {
-        return Ok(());
-    }
-    Err(Refusal { key, reason: format!("{value} is not within {low} to {high}") })
 }
 
 impl Recipe {
@@ -188,7 +146,7 @@ impl Recipe {
     /// [`Error::Io`], and those of [`Self::parse`].
     pub fn read_with(path: &Path, settings: &[(&str, &str)]) -> vpr_core::Result<Self> {
         let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
-        crate::catalog::set(&text, path, settings)
+        Self::parse_with(&text, path, settings)
     }
 
     /// The steps of a route with this distance between them at which images are taken: the places,
@@ -265,29 +223,5 @@ impl Recipe {
             });
         }
         families.into_iter().flatten().collect()
-    }
-}
-
-impl Traverse {
-    /// Checks all numbers; `path` is for messages.
-    pub(crate) fn checked(&self, path: &Path) -> vpr_core::Result<()> {
-        self.check().map_err(|refusal| Error::format(path, refusal.key, refusal.reason))
-    }
-
-    fn check(&self) -> Result<(), Refusal> {
-        self.condition.check()?;
-        self.film.check()?;
-        self.offset.check()
-    }
-}
-
-impl Offset {
-    fn check(&self) -> Result<(), Refusal> {
-        between("lateral_m", self.lateral_m, -50.0, 50.0)?;
-        between("forward_m", self.forward_m, -100.0, 100.0)?;
-        between("up_m", self.up_m, -1.2, 50.0)?;
-        between("yaw_deg", self.yaw_deg, -180.0, 180.0)?;
-        between("pitch_deg", self.pitch_deg, -60.0, 60.0)?;
-        between("jitter", self.jitter, 0.0, 5.0)
     }
 }
