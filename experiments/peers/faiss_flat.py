@@ -1,7 +1,7 @@
 """FAISS and vpr-core side by side: exact search, the same file, the same threads, alternately.
 
     pip install faiss-cpu numpy
-    cargo build -p vpr-core --example peer_search
+    cargo build --example peer_search
     python experiments/peers/faiss_flat.py --ours target/debug/examples/peer_search
 
 Prints, for every case, the median and the minimum of both sides in milliseconds, the ratio of the

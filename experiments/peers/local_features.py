@@ -1,7 +1,7 @@
 """OpenCV and vpr-vision side by side: SIFT, ratio matching, homographies; the same images, two threads, alternately.
 
     pip install "opencv-python-headless<5" numpy
-    cargo build -p vpr-vision --example local_features_time
+    cargo build --example local_features_time
     python experiments/peers/local_features.py IMAGE_A IMAGE_B --ours target/debug/examples/local_features_time
 
 The two images should show the same place. For matching, the SIFT descriptors of both images and of their halves,

@@ -1,7 +1,7 @@
 """RANSAC beside OpenCV on the same correspondences: a homography within 5 pixels and a fundamental matrix
 within 3, at most 1 000 iterations, on pairs of real images matched by OpenCV's SIFT, one thread each, in one session.
 
-    cargo build -p vpr-vision --example ransac_time
+    cargo build --example ransac_time
     python experiments/peers/ransac.py path/to/data target/debug/examples/ransac_time
 
 OpenCV always stops early; both are given confidence 0.999999. Ours is also run to exactly 1 000 iterations, which

@@ -1,7 +1,7 @@
 """Geometric verification beside OpenCV: SIFT with 5 000 features, ratio 0.6, a homography by 1 000
 iterations of RANSAC within 5 pixels, on pairs of real images, one thread each, in one session.
 
-    cargo build -p sue --example verify_time
+    cargo build --example verify_time
     python experiments/peers/sift_ransac.py path/to/data target/debug/examples/verify_time
 
 Prints milliseconds per pair by stage (both images' features, matching, RANSAC) and ours ÷ OpenCV.

@@ -164,8 +164,8 @@ fn unpack(entry: &DatasetEntry, folder: &Path, cache: &Path) -> Result<Dataset> 
         digest.update(side.as_standard_layout().as_slice().unwrap_or_default());
     }
     let digest = digest.finalize();
-    let short: String = digest[..8].iter().map(|byte| format!("{byte:02x}")).collect();
-    let root = cache.join(format!("{}-{short}", entry.id));
+    let short = u64::from_be_bytes(std::array::from_fn(|byte| digest[byte]));
+    let root = cache.join(format!("{}-{short:016x}", entry.id));
     let queries = unpack_side(&pairs.queries, &pairs.frames, &root.join("query"))?;
     let references = unpack_side(&pairs.references, &pairs.frames, &root.join("ref"))?;
     Dataset::of_pairs(entry, queries, references)

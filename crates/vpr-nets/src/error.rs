@@ -52,8 +52,9 @@ impl From<Error> for vpr_core::Error {
             Error::Core(err) => err,
             Error::Weights { path, mismatch } => Self::format(path, "keys", mismatch.to_string()),
             Error::OtherRun { folder, differences } => {
-                let lines: String = differences.iter().map(|it| format!("\n{it}")).collect();
-                Self::format(folder, "settings", format!("those of another run:{lines}"))
+                let lines: Vec<String> = differences.iter().map(ToString::to_string).collect();
+                let reason = format!("those of another run:\n{}", lines.join("\n"));
+                Self::format(folder, "settings", reason)
             }
             Error::Pattern { pattern, reason } => {
                 Self::format("key pattern", format!("`{pattern}`"), reason)

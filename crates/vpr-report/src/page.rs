@@ -152,10 +152,8 @@ fn read_text(path: &Path) -> Result<String> {
 
 /// What a file holds; `None` if there is none.
 fn present<T>(path: &Path, read: impl FnOnce(&Path) -> Result<T>) -> Result<Option<T>> {
-    match path.try_exists().map_err(Error::io(path))? {
-        true => read(path).map(Some),
-        false => Ok(None),
-    }
+    let is_there = path.try_exists().map_err(Error::io(path))?;
+    is_there.then(|| read(path)).transpose()
 }
 
 /// Whether two drawings have the same elements at the same places, up to rounding.

@@ -69,11 +69,12 @@ impl Store {
         {
             return Ok(kept);
         }
-        let made = make()?;
-        let mut writer = MapWriter::create(&path, made.dim(), RowType::F32, about.clone())?;
-        writer.append(made.view(), None, None)?;
+        let descriptors = make()?;
+        let dim = descriptors.dim();
+        let mut writer = MapWriter::create(&path, dim, RowType::F32, about.clone())?;
+        writer.append(descriptors.view(), None, None)?;
         writer.finish()?;
-        Ok(made)
+        Ok(descriptors)
     }
 
     /// Counts under a key, `n` of them, or those that `make` gives, which are then kept.
@@ -91,11 +92,11 @@ impl Store {
         if let Some(kept) = kept_counts(&path, n) {
             return Ok(kept);
         }
-        let made = make()?;
+        let counts = make()?;
         let stored: Vec<i64> =
-            made.iter().map(|&count| i64::try_from(count).unwrap_or(i64::MAX)).collect();
+            counts.iter().map(|&count| i64::try_from(count).unwrap_or(i64::MAX)).collect();
         npy::write_i64(&path, &stored)?;
-        Ok(made)
+        Ok(counts)
     }
 
     fn path(&self, kind: &str, file: &str) -> Result<PathBuf> {
@@ -120,7 +121,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let images: Vec<PathBuf> =
             ["a", "b", "c"].map(|name| folder.path().join(name)).into_iter().collect();
-        images.iter().for_each(|path| fs::write(path, b"x").unwrap());
+        for path in &images {
+            fs::write(path, b"x").unwrap();
+        }
         let key = |method: &str, queries: &[PathBuf], references: &[PathBuf]| {
             Store::key(method, [queries, references]).unwrap()
         };

@@ -30,13 +30,16 @@ pub struct Subject {
     pub learned: Vec<Learned>,
 }
 
+/// A dataset under an encoder that predicts variances, or why there is none.
+pub(super) type LearnedCorpus = (Learned, Result<Arc<Corpus>, String>);
+
 /// One corpus with its row label.
 pub(super) struct Labelled {
     /// Row label.
     pub(super) row: String,
     pub(super) corpus: Arc<Corpus>,
     /// The same dataset under encoders that predict variances, or why there is none.
-    pub(super) learned: Vec<(Learned, Result<Arc<Corpus>, String>)>,
+    pub(super) learned: Vec<LearnedCorpus>,
 }
 
 /// The uncertainties of one method, or why it has none.
@@ -78,10 +81,7 @@ pub(super) fn open(
 }
 
 /// The subject's dataset under every learned encoder that it lists.
-fn learned_of(
-    subject: &Subject,
-    context: Context<'_>,
-) -> Result<Vec<(Learned, Result<Arc<Corpus>, String>)>> {
+fn learned_of(subject: &Subject, context: Context<'_>) -> Result<Vec<LearnedCorpus>> {
     let open = |&learned: &Learned| {
         let name = [learned.key().to_owned()];
         let mut opened = context.corpora.open(&subject.dataset, &name)?;
@@ -168,7 +168,7 @@ impl Labelled {
 
     /// The variances of learned encoders, each about its own matches.
     pub(super) fn score_learned(&self) -> Result<Vec<Scored>> {
-        let score = |(learned, corpus): &(Learned, Result<Arc<Corpus>, String>)| {
+        let score = |(learned, corpus): &LearnedCorpus| {
             let (uncertainty, own) = match corpus {
                 Ok(corpus) => (Ok(corpus.variance(*learned)?), Some(corpus.judged.clone())),
                 Err(why) => (Err(why.clone()), None),

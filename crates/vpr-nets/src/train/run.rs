@@ -168,8 +168,8 @@ fn differences(was: &[(String, String)], now: &[(&str, String)]) -> Vec<Differen
 
 /// The lines of a message, one for each difference.
 pub(crate) fn listed(folder: &Path, differences: &[Difference]) -> String {
-    let lines: String = differences.iter().map(|it| format!("\n{it}")).collect();
-    format!("{}: a run with other settings:{lines}", folder.display())
+    let lines: Vec<String> = differences.iter().map(ToString::to_string).collect();
+    format!("{}: a run with other settings:\n{}", folder.display(), lines.join("\n"))
 }
 
 #[cfg(test)]

@@ -19,13 +19,9 @@ pub struct Drawings<'a> {
 #[must_use]
 pub fn markdown_page(table: &Table, source: &str, drawings: Drawings<'_>) -> String {
     let stable = without_timings(table);
-    let mut picture = String::new();
-    if drawings.figure {
-        picture += &format!("![{0}]({0}.svg)\n\n", table.id);
-    }
-    if let Some(legend) = drawings.sheet {
-        picture += &format!("![{0}]({0}.png)\n\n{legend}\n\n", table.id);
-    }
+    let figure = drawings.figure.then(|| format!("![{0}]({0}.svg)\n\n", table.id));
+    let sheet = drawings.sheet.map(|legend| format!("![{0}]({0}.png)\n\n{legend}\n\n", table.id));
+    let picture: String = figure.into_iter().chain(sheet).collect();
     format!(
         "# {id}: {title}\n\nSource: {source}. Written by `cargo xtask reproduce {id} --write`; do not edit.\n\n\
          Origins: `published`, computed from the author's published files; `measured`, from real images; \
