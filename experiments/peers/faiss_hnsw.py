@@ -1,7 +1,7 @@
 """FAISS's HNSW and ours (USearch's, ranked exactly) at equal recall, on clustered data.
 
     pip install faiss-cpu numpy
-    cargo build -p vpr-core --features approximate,cli --example peer_hnsw
+    cargo build --features vpr-bench/approximate --example peer_hnsw
     python experiments/peers/faiss_hnsw.py --ours target/debug/examples/peer_hnsw
 
 Both graphs have the same number of links and the same effort while they are built. For every kind of

@@ -39,12 +39,12 @@ fn number(text: &str, label: &str) -> f64 {
 fn netvlad_on_corridor_has_the_numbers_of_its_file() {
     let Some(text) = corridor("netvlad-mobilenetv2-rgb") else { return };
     println!("{text}");
-    for (label, expected) in [("R@1:", 46.8), ("R@5:", 81.1)] {
+    for (label, expected) in [("R@1:", 45.0), ("R@5:", 82.0)] {
         let actual = number(&text, label);
         assert!((actual - expected).abs() <= 1.0, "{label} {actual}, not {expected}");
     }
     let area = number(&text, "AUC-PR:");
-    assert!((area - 0.566).abs() <= 0.01, "AUC-PR {area}, not .566");
+    assert!((area - 0.545).abs() <= 0.001, "AUC-PR {area}, not .545");
 }
 
 #[test]

@@ -62,9 +62,31 @@ impl NetVladMobile {
         let assignment = softmax(scores, 2);
         let mass = assignment.clone().sum_dim(1);
         let sums = features.matmul(assignment) + self.centres.val().unsqueeze::<3>() * mass;
-        let norms = sums.clone().square().sum_dim(1).sqrt().clamp_min(1e-12);
-        let flat = (sums / norms).swap_dims(1, 2).flatten::<2>(1, 2);
-        let norms = flat.clone().square().sum_dim(1).sqrt().clamp_min(1e-12);
-        flat / norms
+        let flat = keras_l2_normalize(sums).swap_dims(1, 2).flatten::<2>(1, 2);
+        keras_l2_normalize(flat)
+    }
+}
+
+/// `x / √(max(Σ x², 1e-12))` along axis 1, as TensorFlow's `l2_normalize`, which Keras calls: the
+/// bound is on the *square*, so that clusters shorter than 1e-6 stay near zero. About half of the
+/// images of a corridor have one; [`crate::layer::l2_normalize`] would blow it up to full length.
+fn keras_l2_normalize<const D: usize>(x: Tensor<D>) -> Tensor<D> {
+    let norms = x.clone().square().sum_dim(1).clamp_min(1e-12).sqrt();
+    x / norms
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn short_vectors_stay_short() {
+        let rows = [[3.0, 4.0], [3e-7, 4e-7], [0.0, 0.0]];
+        let scaled = keras_l2_normalize(Tensor::<2>::from_floats(rows, &Device::flex()));
+        let values: Vec<f32> = scaled.into_data().try_to_vec().unwrap();
+        // 5e-7 / √1e-12 is a half.
+        for (value, expected) in values.into_iter().zip([0.6, 0.8, 0.3, 0.4, 0.0, 0.0]) {
+            assert!((value - expected).abs() < 1e-6, "{value} is not {expected}");
+        }
     }
 }
