@@ -39,7 +39,7 @@ impl Dataset {
     /// [`Error::Io`] or [`Error::Format`] with the folder or file that is missing, empty or
     /// malformed; the latter also if the ground truth is not about as many queries as there are
     /// images. [`Error::Parameter`] if the layout is not one of image files; for archives see
-    /// [`layout::npz_images`].
+    /// [`crate::layout::npz_images`].
     pub fn open(entry: &DatasetEntry, roots: &DataRoots) -> Result<Self> {
         let folder = roots.find(&entry.path)?;
         match entry.layout {

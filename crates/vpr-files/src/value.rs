@@ -28,7 +28,7 @@ pub enum Value {
         /// The elements in C order, as many as the product of `shape`.
         elements: Elements,
     },
-    /// A tensor of a PyTorch checkpoint; only [`decode_checkpoint`](super::decode_checkpoint)
+    /// A tensor of a PyTorch checkpoint; only [`decode_checkpoint`](crate::pickle::decode_checkpoint)
     /// makes these.
     Tensor(Tensor),
 }

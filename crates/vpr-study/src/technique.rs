@@ -1,7 +1,7 @@
 //! The registry of techniques: what each is called in the thesis, in tables and where it is typed,
 //! and what runs here.
 //!
-//! A technique is added by its own files and one line of [`HAND_CRAFTED`] or [`NETWORKS`]; every
+//! A technique is added by its own files and one line of `HAND_CRAFTED` or `NETWORKS`; every
 //! table, command and cache learns of it from there.
 
 use std::sync::Arc;
@@ -89,7 +89,7 @@ pub fn runners(roots: &DataRoots) -> Result<Vec<Runner>> {
 ///
 /// # Errors
 ///
-/// [`Error::Unknown`] with the names there are; weights that are there but are not those of the
+/// [`vpr_core::Error::Unknown`] with the names there are; weights that are there but are not those of the
 /// network.
 pub fn find(name: &str, roots: &DataRoots) -> Result<Found> {
     match hand_crafted(name) {

@@ -100,7 +100,7 @@ impl Learned {
 }
 
 impl LearnedEncoder {
-    /// Reads weights as [`super::save`] writes them.
+    /// Reads weights as [`vpr_nets::weights::save`] writes them.
     ///
     /// # Errors
     ///

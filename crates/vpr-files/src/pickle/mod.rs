@@ -76,7 +76,7 @@ pub fn read(path: &Path) -> Result<Value> {
 
 /// Decodes the checkpoint's pickle that `bytes` begin with; returns its value and its length.
 ///
-/// Beside what [`decode`](super::decode) reads, tensors are [`Value::Tensor`], ordered
+/// Beside what [`decode`] reads, tensors are [`Value::Tensor`], ordered
 /// dictionaries are dictionaries, and settings that lie beside weights (`argparse.Namespace`,
 /// paths, devices) are [`Value::None`]. Nothing is called.
 ///
