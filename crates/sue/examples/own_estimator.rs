@@ -43,38 +43,20 @@ impl UncertaintyEstimator for TwoBest {
     }
 }
 
-/// Three streets: the direction of a descriptor in degrees, metres east. The end of the first looks
-/// like the start of the second.
-const REFERENCES: [(f32, f64); 9] = [
-    (0.0, 0.0),
-    (5.0, 4.0),
-    (10.0, 8.0),
-    (16.0, 300.0),
-    (21.0, 304.0),
-    (26.0, 308.0),
-    (60.0, 600.0),
-    (65.0, 604.0),
-    (70.0, 608.0),
-];
-
-/// The third and fourth are between look-alikes; the seventh was taken where no map is.
-const QUERIES: [(f32, f64); 8] = [
-    (2.0, 1.0),
-    (7.0, 5.0),
-    (12.5, 303.0),
-    (15.0, 9.0),
-    (22.0, 305.0),
-    (62.0, 601.0),
-    (40.0, 900.0),
-    (68.0, 607.0),
-];
+/// Three streets: the direction of each descriptor in degrees, and where it was taken, in metres
+/// east. The end of the first street looks like the start of the second.
+const LOOKS: [f32; 9] = [0.0, 5.0, 10.0, 16.0, 21.0, 26.0, 60.0, 65.0, 70.0];
+const EAST: [f64; 9] = [0.0, 4.0, 8.0, 300.0, 304.0, 308.0, 600.0, 604.0, 608.0];
+/// The third and fourth query are between look-alikes; the seventh was taken where no map is.
+const QUERY_LOOKS: [f32; 8] = [2.0, 7.0, 12.5, 15.0, 22.0, 62.0, 40.0, 68.0];
+const QUERY_EAST: [f64; 8] = [1.0, 5.0, 303.0, 9.0, 305.0, 601.0, 900.0, 607.0];
 
 fn main() -> Result<()> {
-    let map = Map::new(descriptors(&REFERENCES)?, poses(&REFERENCES))?;
-    let retrieval = retrieve(&descriptors(&QUERIES)?, map.descriptors(), 3)?;
+    let map = Map::new(descriptors(&LOOKS)?, poses(&EAST))?;
+    let retrieval = retrieve(&descriptors(&QUERY_LOOKS)?, map.descriptors(), 3)?;
 
     // Which best references are right: those within 25 m.
-    let truth = GroundTruth::within_radius(&poses(&QUERIES), map.poses(), 25.0)?;
+    let truth = GroundTruth::within_radius(&poses(&QUERY_EAST), map.poses(), 25.0)?;
     let judged = Judged::new(&retrieval.best(), &truth)?;
     println!("{} queries, {:.3} of them right", judged.len(), judged.base_rate());
 
@@ -95,14 +77,12 @@ where
     Ok(())
 }
 
-fn descriptors(images: &[(f32, f64)]) -> vpr_core::Result<Descriptors> {
-    let value = |(row, column): (usize, usize)| {
-        let (sine, cosine) = images[row].0.to_radians().sin_cos();
-        if column == 0 { cosine } else { sine }
-    };
-    Descriptors::new(Array2::from_shape_fn((images.len(), 2), value))
+fn descriptors(looks: &[f32]) -> vpr_core::Result<Descriptors> {
+    let degrees =
+        Array2::from_shape_fn((looks.len(), 2), |(row, axis)| [0.0, 90.0][axis] - looks[row]);
+    Descriptors::new(degrees.mapv(|it| it.to_radians().cos()))
 }
 
-fn poses(images: &[(f32, f64)]) -> Poses {
-    Poses::Planar(images.iter().map(|&(_, east)| PlanarPosition::new(east, 0.0)).collect())
+fn poses(east: &[f64]) -> Poses {
+    Poses::Planar(east.iter().map(|&east| PlanarPosition::new(east, 0.0)).collect())
 }

@@ -18,7 +18,7 @@ use burn::{
 };
 use vpr_core::{metrics::recall_at, retrieve};
 use vpr_nets::{
-    encode::{Channels, Encoder, Options, Preprocessing, Size, encode_files},
+    encode::{Channels, Encoder, Options, Preprocessing, encode_files},
     layer::{Conv2d, Conv2dConfig, l2_normalize_rows},
     train::seeded,
 };
@@ -35,51 +35,39 @@ struct Layers {
 }
 
 /// The network with what an encoder must say of itself.
-struct Tiny {
-    layers: Layers,
-    preprocessing: Preprocessing,
-}
+struct Tiny(Layers, Preprocessing);
 
 impl Tiny {
-    /// Channels of the last layer; they are averaged over `GRID` rows and columns.
-    const CHANNELS: usize = 16;
-    const GRID: [usize; 2] = [3, 4];
-
     fn new(seed: u64, device: &Device) -> Self {
         let layers = Layers {
             edges: Conv2dConfig::new([1, 8], [5, 5]).with_stride([2, 2]).init(device),
-            parts: Conv2dConfig::new([8, Self::CHANNELS], [5, 5]).with_stride([2, 2]).init(device),
+            parts: Conv2dConfig::new([8, 16], [5, 5]).with_stride([2, 2]).init(device),
         };
         // Images become 80 × 60 grey values around 0.
-        let image_net = Preprocessing::image_net(60, 80);
-        let preprocessing = Preprocessing {
-            size: Size::Fixed { height: 60, width: 80 },
-            channels: Channels::Gray,
-            mean: [0.5; 3],
-            std: [0.25; 3],
-            ..image_net
-        };
-        Self { layers: seeded(layers, seed), preprocessing }
+        let mut preprocessing = Preprocessing::image_net(60, 80);
+        preprocessing.channels = Channels::Gray;
+        (preprocessing.mean, preprocessing.std) = ([0.5; 3], [0.25; 3]);
+        Self(seeded(layers, seed), preprocessing)
     }
 }
 
 impl Encoder for Tiny {
-    fn name(&self) -> &str {
+    fn name(&self) -> &'static str {
         "tiny"
     }
 
     fn dimension(&self) -> usize {
-        Self::CHANNELS * Self::GRID[0] * Self::GRID[1]
+        16 * 3 * 4 // channels of the last layer, averaged over 3 × 4 fields
     }
 
     fn preprocessing(&self) -> &Preprocessing {
-        &self.preprocessing
+        &self.1
     }
 
     fn forward(&self, images: Tensor<4>) -> Tensor<2> {
-        let edges = relu(self.layers.edges.forward(images));
-        let parts = relu(self.layers.parts.forward(edges));
-        l2_normalize_rows(adaptive_avg_pool2d(parts, Self::GRID).flatten(1, 3))
+        let edges = relu(self.0.edges.forward(images));
+        let parts = relu(self.0.parts.forward(edges));
+        l2_normalize_rows(adaptive_avg_pool2d(parts, [3, 4]).flatten(1, 3))
     }
 }
 

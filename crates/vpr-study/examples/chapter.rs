@@ -1,10 +1,9 @@
 //! What a new chapter starts from: a [`Study`], [`run`], and `main`. No line is another chapter's.
 //!
-//! `cargo run -p vpr-study --example chapter` runs the file below; `… -- run FILE --write DIR` one of
-//! your own, with the flags of all chapters. Move this to `crates/<chapter>/src/main.rs`, without
-//! [`EXPERIMENT`]; `cargo xtask reproduce <id>` then finds it by the `chapter` of a file.
+//! `cargo run -p vpr-study --example chapter` runs the file below, `… -- run FILE --write DIR` yours.
+//! In `crates/<chapter>/src/main.rs` it is what `cargo xtask reproduce <id>` finds by `chapter`.
 
-use std::{env, ffi::OsStr, fs, process::ExitCode};
+use std::{env, ffi::OsString, fs, process::ExitCode};
 
 use clap::Parser;
 use serde::Deserialize;
@@ -23,21 +22,17 @@ id = "table-0"
 title = "Recall@1 on a generated street"
 source = "the example of a chapter"
 chapter = "chapter"
-
 [study]
 kind = "recall"
 datasets = ["world/street?places=20&camera.width=160&camera.height=120&camera.focal=115.0"]
 "#;
 
-/// What to compute; the key `kind` of `[study]` chooses. A misspelled key is an error with its line.
+/// What to compute; `kind` chooses. A misspelled key is an error with its line.
 #[derive(Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 enum Study {
     /// Recall@1 of every technique that runs here.
-    Recall {
-        /// Datasets, by id.
-        datasets: Vec<String>,
-    },
+    Recall { datasets: Vec<String> },
 }
 
 fn run(experiment: &Experiment<Study>, sources: &Sources<'_>) -> Result<Report> {
@@ -54,10 +49,7 @@ fn run(experiment: &Experiment<Study>, sources: &Sources<'_>) -> Result<Report> 
 /// One row: a cell per technique; data that is not at hand makes absent cells, not an error.
 fn recall(table: &mut Table, id: &str, sources: &Sources<'_>) -> Result<()> {
     let Some(dataset) = sources.images(id)? else {
-        let (row, why) = (sources.entry(id)?.name, sources.why_absent(id, "images")?);
-        let cells = sources.runners()?.iter().map(|it| Cell::absent(&row, it.column, &why));
-        cells.for_each(|cell| table.push(cell));
-        return Ok(());
+        return sources.push_absent(table, id, &sources.entry(id)?.name);
     };
     for runner in sources.runners()? {
         let scores = sources.scores(runner, &dataset, Direction::AsReleased)?; // computed once
@@ -68,10 +60,9 @@ fn recall(table: &mut Table, id: &str, sources: &Sources<'_>) -> Result<()> {
     Ok(())
 }
 
-/// The example of a chapter.
 #[derive(Parser)]
 enum Command {
-    /// Run an experiment file and compare it with the numbers of the thesis
+    /// Run experiment files and compare them with the numbers of the thesis
     Run(RunArgs),
 }
 
@@ -80,11 +71,11 @@ fn main() -> ExitCode {
         let folder = tempfile::tempdir()?;
         let file = folder.path().join("table-0.toml");
         fs::write(&file, EXPERIMENT)?;
-        let built_in = [OsStr::new("chapter"), OsStr::new("run"), file.as_os_str()];
-        let given = env::args_os().len() > 1;
-        let Command::Run(args) =
-            if given { Command::parse() } else { Command::parse_from(built_in) };
-
+        let mut words: Vec<OsString> = env::args_os().collect();
+        if words.len() < 2 {
+            words.extend(["run".into(), file.into_os_string()]);
+        }
+        let Command::Run(args) = Command::parse_from(words);
         let experiments = args.open::<Study>("chapter")?; // env!("CARGO_PKG_NAME") in a crate
         let bar = Bar::default();
         let folders = [&*args.data.data, &args.workspace_data()];
