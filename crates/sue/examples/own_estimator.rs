@@ -1,7 +1,7 @@
 //! An estimator of uncertainty of your own, judged beside SUE.
 //!
 //! ```text
-//! cargo run -p sue --no-default-features --example own_estimator
+//! cd crates/sue && cargo run --no-default-features --example own_estimator
 //! ```
 #![expect(clippy::print_stdout, reason = "an example prints what it found")]
 

@@ -35,3 +35,8 @@ pub fn device() -> burn::tensor::Device {
 /// Version of the numbers: raised when a network or kernel gives other bits for the same input.
 /// Whoever keeps results keeps it with them, so that they are not taken for another version's.
 pub const NUMERICS: u32 = 3;
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;
