@@ -26,6 +26,11 @@ pub mod weights;
 
 pub use error::{Error, Mismatch, Result};
 
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;
+
 /// The device that networks run on: the default CPU backend.
 #[must_use]
 pub fn device() -> burn::tensor::Device {
@@ -35,8 +40,3 @@ pub fn device() -> burn::tensor::Device {
 /// Version of the numbers: raised when a network or kernel gives other bits for the same input.
 /// Whoever keeps results keeps it with them, so that they are not taken for another version's.
 pub const NUMERICS: u32 = 3;
-
-/// The examples of the README, as tests.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-pub struct Readme;

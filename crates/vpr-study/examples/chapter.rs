@@ -6,7 +6,6 @@
 use std::{env, ffi::OsString, fs, process::ExitCode};
 
 use clap::Parser;
-use serde::Deserialize;
 use vpr_core::{Result, metrics::recall_at};
 use vpr_report::{
     cli::{self, Bar, Outcome, RunArgs},
@@ -28,7 +27,7 @@ datasets = ["world/street?places=20&camera.width=160&camera.height=120&camera.fo
 "#;
 
 /// What to compute; `kind` chooses. A misspelled key is an error with its line.
-#[derive(Deserialize)]
+#[derive(serde::Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 enum Study {
     /// Recall@1 of every technique that runs here.
@@ -76,7 +75,7 @@ fn main() -> ExitCode {
             words.extend(["run".into(), file.into_os_string()]);
         }
         let Command::Run(args) = Command::parse_from(words);
-        let experiments = args.open::<Study>("chapter")?; // env!("CARGO_PKG_NAME") in a crate
+        let experiments = args.open::<Study>("chapter")?; // the name of your program
         let bar = Bar::default();
         let folders = [&*args.data.data, &args.workspace_data()];
         let sources = Sources::new(folders, &args.data.cache, &bar);
