@@ -18,3 +18,8 @@
 //! ```
 
 pub mod study;
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

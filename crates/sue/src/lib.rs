@@ -47,3 +47,8 @@ pub use estimator::{
     UncertaintyEstimator, Uniform, Variance,
 };
 pub use evidence::{Evidence, InlierCounts, Needs, Neighbors, Places, Share, Variances};
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

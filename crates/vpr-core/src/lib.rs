@@ -4,7 +4,7 @@
 //!
 //! ```
 //! use ndarray::array;
-//! use crate::{Descriptors, GroundTruth, metrics, retrieve};
+//! use vpr_core::{Descriptors, GroundTruth, metrics, retrieve};
 //!
 //! let references = Descriptors::new(array![[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])?;
 //! let queries = Descriptors::new(array![[0.9, 0.1]])?;
@@ -14,7 +14,7 @@
 //!
 //! let truth = GroundTruth::from_lists(vec![vec![0]], references.len())?;
 //! assert_eq!(metrics::recall_at(1, &retrieval, &truth)?, 1.0);
-//! # Ok::<(), crate::Error>(())
+//! # Ok::<(), vpr_core::Error>(())
 //! ```
 //!
 //! Conventions: descriptors are f32, poses and metrics f64; Euclidean distances are not squared

@@ -23,3 +23,8 @@ pub use dataset::Dataset;
 pub use manifest::{DataRoots, DatasetEntry, Layout, Manifest, Tolerance};
 pub use open::{Datasets, Generator};
 pub use validate::{Problem, Severity, validate};
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -28,3 +28,8 @@ mod value;
 
 pub use error::{Error, Result, shorten};
 pub use replace::{NewFile, replace};
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

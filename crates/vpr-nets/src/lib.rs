@@ -26,6 +26,11 @@ pub mod weights;
 
 pub use error::{Error, Mismatch, Result};
 
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;
+
 /// The device that networks run on: the default CPU backend.
 #[must_use]
 pub fn device() -> burn::tensor::Device {

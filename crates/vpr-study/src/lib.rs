@@ -46,3 +46,8 @@ pub use store::Store;
 pub use stored::Stored;
 pub use subject::Subject;
 pub use technique::{Runner, Technique};
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

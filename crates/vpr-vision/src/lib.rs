@@ -28,3 +28,8 @@ pub mod sift;
 /// same input. Whoever keeps results keeps it with them, so that they are not taken for another
 /// version's.
 pub const NUMERICS: u32 = 3;
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;

@@ -8,7 +8,7 @@
 //! A metric without a value for its input is an [`Error::Undefined`], never a NaN.
 //!
 //! ```
-//! use crate::metrics::{Positives, auc_pr, recall_at_precision};
+//! use vpr_core::metrics::{Positives, auc_pr, recall_at_precision};
 //!
 //! let confidence = [0.9, 0.8, 0.7, 0.6];
 //! let correct = [true, true, false, true];
@@ -18,7 +18,7 @@
 //! let corrected = auc_pr(&confidence, &correct, Positives::Corrected { n_known: 5 })?;
 //! assert!(corrected < published);
 //! assert_eq!(recall_at_precision(1.0, &confidence, &correct, Positives::Corrected { n_known: 5 })?, 0.4);
-//! # Ok::<(), crate::Error>(())
+//! # Ok::<(), vpr_core::Error>(())
 //! ```
 //!
 //! [`Definition`]: crate::Definition

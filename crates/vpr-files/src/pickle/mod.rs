@@ -12,13 +12,13 @@
 //! PyTorch's checkpoints have a dialect of their own, [`decode_checkpoint`].
 //!
 //! ```
-//! use crate::pickle::{Value, decode};
+//! use vpr_files::pickle::{Value, decode};
 //!
 //! assert_eq!(decode(b"(I0\nI-1\nl.")?, Value::List(vec![Value::Int(0), Value::Int(-1)]));
 //!
 //! let refusal = decode(b"cos\nsystem\n(S'true'\ntR.").unwrap_err();
 //! assert_eq!(refusal.to_string(), "byte 0: GLOBAL: `os.system` is not on the list of what is read");
-//! # Ok::<(), crate::pickle::Refusal>(())
+//! # Ok::<(), vpr_files::pickle::Refusal>(())
 //! ```
 
 mod cursor;
