@@ -102,7 +102,10 @@ fn a_fresh_clone_computes_generated_cells_and_says_what_is_absent() {
     assert_eq!(named.len(), 10, "one per technique");
     assert!(named.iter().all(|it| it["note"].as_str().is_some_and(|note| note.contains("origin"))));
     let keys: Vec<&String> = cells[0].as_object().expect("a cell").keys().collect();
-    assert_eq!(keys, ["column", "definition", "n", "note", "provenance", "row", "thesis", "value"]);
+    assert_eq!(
+        keys,
+        ["column", "definition", "interval", "n", "note", "provenance", "row", "thesis", "value"]
+    );
 }
 
 #[test]
