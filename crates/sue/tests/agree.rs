@@ -1,7 +1,5 @@
 //! Chapters 3 and 5 see the same matches.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::path::Path;
 
 use sue::corpus::Corpora;

@@ -1,7 +1,5 @@
 //! What is kept of one dataset is never taken for another's, and a replaced image is seen.
 
-#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
-
 use std::{fs, sync::Arc};
 
 use vpr_core::GroundTruth;
