@@ -136,6 +136,39 @@ fn heavy_packages_have_one_home() {
     }
 }
 
+/// The features of every package from a registry, as the workspace is built with these arguments.
+fn features(arguments: &[&str]) -> BTreeMap<String, String> {
+    let output = Command::new(env!("CARGO"))
+        .current_dir(workspace())
+        .args(["tree", "--workspace", "--offline", "--no-dedupe", "--prefix", "none"])
+        .args(["--format", "{p}|{f}"])
+        .args(arguments)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).unwrap();
+    let packages = text.lines().filter(|line| !line.contains(" (/"));
+    packages
+        .filter_map(|line| line.split_once('|'))
+        .map(|(package, features)| (package.to_owned(), features.to_owned()))
+        .collect()
+}
+
+/// What one command compiled, the next does not compile again: programs, tests and the first table
+/// ask every dependency for the same features.
+#[test]
+fn no_dependency_is_compiled_twice() {
+    let tests = features(&["--edges", "normal,build,dev"]);
+    let first = ["--no-default-features", "--features", "vpr-bench/cli"];
+    for arguments in [&[][..], &first] {
+        let programs = features(&[&["--edges", "normal,build"], arguments].concat());
+        assert!(programs.len() > 150, "{} packages", programs.len());
+        for (package, features) in programs {
+            assert_eq!(tests[&package], features, "features of {package}, with {arguments:?}");
+        }
+    }
+}
+
 #[test]
 fn burn_is_named_in_vpr_nets_and_net_folders_only() {
     let mut n = 0;
