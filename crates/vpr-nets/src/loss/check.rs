@@ -1,7 +1,7 @@
 //! Checks that every loss goes through.
 
 use burn::{
-    module::{Module, ModuleMapper, Param},
+    module::Module,
     optim::GradientsParams,
     tensor::{Device, Tensor, TensorData},
 };
@@ -63,7 +63,7 @@ pub(crate) fn head_gradient<M: Module>(
     rows: (Vec<f32>, [usize; 2]),
     forward: impl Fn(&M, Tensor<2>) -> Tensor<2>,
 ) {
-    let recording = seeded(head, 3).map(&mut WithoutBias);
+    let recording = seeded(head, 3);
     let plain = recording.clone().valid();
     gradient(rows, |rows| {
         let head = if rows.is_require_grad() { &recording } else { &plain };
@@ -73,23 +73,6 @@ pub(crate) fn head_gradient<M: Module>(
         let direction = Tensor::from_data(TensorData::new(direction, shape), &device);
         (descriptors * direction).sum()
     });
-}
-
-/// Takes away first biases, which a generator of the whole process draws, all within ±½; vectors of
-/// ones stay.
-struct WithoutBias;
-
-impl ModuleMapper for WithoutBias {
-    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        if D > 1 {
-            return param;
-        }
-        param.map(|old| {
-            let (tracked, device) = (old.is_require_grad(), old.device());
-            let rounded = old.detach().round().into_data();
-            Tensor::from_data(rounded, &device).set_require_grad(tracked)
-        })
-    }
 }
 
 /// The rows of a batch as queries, positives and negatives.
