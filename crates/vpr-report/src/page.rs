@@ -41,6 +41,10 @@ impl Report {
         Self { table, figure, sheet: None }
     }
 
+    fn svg(&self, figure: &Figure) -> String {
+        figure.svg(&format!("{}: {}", self.table.id, self.table.title))
+    }
+
     fn drawings(&self) -> Drawings<'_> {
         let sheet = self.sheet.as_ref().map(|sheet| sheet.legend);
         Drawings { figure: self.figure.is_some(), sheet }
@@ -51,8 +55,7 @@ impl Report {
     ///
     /// # Errors
     ///
-    /// [`Error::Io`] if the folder cannot be written; [`Error::Format`] if the figure cannot be
-    /// drawn.
+    /// [`Error::Io`] if the folder cannot be written.
     pub fn write<S>(&self, experiment: &Experiment<S>, folder: &Path) -> Result<()> {
         fs::create_dir_all(folder).map_err(Error::io(folder))?;
         let path = |extension: &str| folder.join(format!("{}.{extension}", self.table.id));
@@ -61,7 +64,7 @@ impl Report {
         let text = markdown_page(&self.table, &experiment.source, self.drawings());
         replace(&path("md"), text.as_bytes())?;
         if let Some(figure) = &self.figure {
-            replace(&path("svg"), svg(figure, &path("svg"))?.as_bytes())?;
+            replace(&path("svg"), self.svg(figure).as_bytes())?;
         }
         if let Some(sheet) = &self.sheet {
             replace(&path("png"), &sheet.png)?;
@@ -90,7 +93,7 @@ impl Report {
             return Ok(checked);
         }
         if let Some(figure) = &self.figure {
-            let drawn = svg(figure, &path("svg"))?;
+            let drawn = self.svg(figure);
             match present(&path("svg"), read_text)? {
                 None => checked.findings.push(missing(&path("svg"))),
                 Some(page) if is_same_drawing(&page, &drawn) => checked.n_compared += 1,
@@ -132,10 +135,6 @@ impl Report {
         }
         Ok(())
     }
-}
-
-fn svg(figure: &Figure, path: &Path) -> Result<String> {
-    figure.svg().map_err(|reason| Error::format(path, "figure", reason))
 }
 
 fn missing(path: &Path) -> Finding {
@@ -191,8 +190,7 @@ mod tests {
     fn report(value: f64) -> Report {
         let mut table = Table::new("figure-0", "t");
         table.push(Cell::new("street", "HOG", value, Provenance::Generated, 9).noted("all"));
-        let points = vec![(0.0, 0.0), (1.0, value)];
-        let curves = vec![Curve { name: "HOG".into(), points }];
+        let curves = vec![Curve::new("HOG", vec![(0.0, 0.0), (1.0, value)])];
         let figure = Figure { panels: vec![Panel { curves, ..Panel::default() }] };
         let sheet = Sheet { png: vec![1, 2, 3], legend: "Grey: query." };
         Report { table, figure: Some(figure), sheet: Some(sheet) }
