@@ -16,7 +16,7 @@ use serde::de::DeserializeOwned;
 use crate::{
     experiment::{self, Experiment},
     page::Report,
-    table::{Checked, Format},
+    table::{Checked, Format, WIDTH},
 };
 use vpr_core::Observer;
 
@@ -191,6 +191,13 @@ impl Observer for Bar {
     }
 }
 
+/// Letters of a line: `COLUMNS`, or what pages have.
+#[must_use]
+pub fn columns() -> usize {
+    let columns = std::env::var("COLUMNS").ok().and_then(|it| it.parse().ok());
+    columns.filter(|columns| *columns > 0).unwrap_or(WIDTH)
+}
+
 /// Prints a result and, as the flags say, writes its page or checks it.
 ///
 /// # Errors
@@ -202,7 +209,7 @@ pub fn finish<S>(
     output: &OutputArgs,
 ) -> anyhow::Result<Outcome> {
     let table = &report.table;
-    print(&table.render(output.format))?;
+    print(&table.render_within(output.format, columns()))?;
     if let Some(folder) = &output.write {
         report.write(experiment, folder)?;
     }

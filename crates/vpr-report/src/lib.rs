@@ -16,6 +16,7 @@
 pub mod cli;
 pub mod experiment;
 pub mod figure;
+pub mod index;
 pub mod page;
 pub mod table;
 

@@ -8,6 +8,7 @@ use vpr_files::replace;
 use crate::{
     experiment::Experiment,
     figure::Figure,
+    index,
     table::{Cell, Checked, Drawings, Finding, Table, check, csv_page, markdown_page, read_csv},
 };
 
@@ -50,8 +51,8 @@ impl Report {
         Drawings { figure: self.figure.is_some(), sheet }
     }
 
-    /// Writes the page, its CSV and its drawings into a folder; each file appears whole or not at
-    /// all.
+    /// Writes the page, its CSV and its drawings into a folder, and lists it there; each file
+    /// appears whole or not at all.
     ///
     /// # Errors
     ///
@@ -69,7 +70,7 @@ impl Report {
         if let Some(sheet) = &self.sheet {
             replace(&path("png"), &sheet.png)?;
         }
-        Ok(())
+        replace(&folder.join(index::FILE), index::index(folder)?.as_bytes())
     }
 
     /// Compares with the committed files in a folder and with the expected numbers.
@@ -89,6 +90,16 @@ impl Report {
         };
         let mut checked = check(&self.table, &committed, &experiment.expect);
         self.check_markdown(&mut checked, experiment, committed, &path("md"))?;
+        let list = folder.join(index::FILE);
+        match present(&list, read_text)? {
+            None => checked.findings.push(missing(&list)),
+            // A page that is missing was found above.
+            Some(_) if !path("md").exists() => {}
+            Some(text) if text.contains(&index::line(folder, &self.table.id)?) => {
+                checked.n_compared += 1;
+            }
+            Some(_) => checked.findings.push(stale(&list)),
+        }
         if checked.n_not_at_hand > 0 {
             return Ok(checked);
         }
@@ -209,12 +220,16 @@ mod tests {
         assert!(findings(&report, folder.path())[0].contains("no committed page"));
         report.write(&Experiment::new("figure-0", "t", ()), folder.path()).unwrap();
         assert_eq!(findings(&report, folder.path()), [""; 0]);
-        for (extension, from, to) in [("md", "all", "some"), ("svg", "HOG", "H0G")] {
-            let path = folder.path().join(format!("figure-0.{extension}"));
+        for (file, from, to) in [
+            ("figure-0.md", "all", "some"),
+            ("figure-0.svg", "HOG", "H0G"),
+            ("index.md", "figure-0.md", "figure-1.md"),
+        ] {
+            let path = folder.path().join(file);
             let text = fs::read_to_string(&path).unwrap();
             fs::write(&path, text.replace(from, to)).unwrap();
             let found = findings(&report, folder.path());
-            assert!(found.len() == 1 && found[0].contains(extension), "{found:?}");
+            assert!(found.len() == 1 && found[0].contains(file), "{found:?}");
             fs::write(&path, text).unwrap();
         }
         fs::write(folder.path().join("figure-0.png"), [1, 2]).unwrap();

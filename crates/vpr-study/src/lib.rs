@@ -40,7 +40,7 @@ pub use memo::Memo;
 #[cfg(feature = "networks")]
 pub use network::Network;
 pub use scored::{Direction, MAX_RANK, Scores};
-pub use sheet::{ContactSheet, Frame};
+pub use sheet::{ContactSheet, Frame, Tile};
 pub use sources::Sources;
 pub use store::Store;
 pub use stored::Stored;
