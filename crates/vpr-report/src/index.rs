@@ -49,7 +49,8 @@ pub fn line(folder: &Path, id: &str) -> Result<String> {
     let verdict = page.lines().find_map(|line| line.strip_prefix(VERDICT)).unwrap_or_default();
     let verdict = verdict.split(" numbers").next().unwrap_or_default();
     let path = folder.join(format!("{id}.csv"));
-    let cells = if path.try_exists().map_err(Error::io(&path))? { read_csv(&path)? } else { Vec::new() };
+    let cells =
+        if path.try_exists().map_err(Error::io(&path))? { read_csv(&path)? } else { Vec::new() };
     let title = title.replace('|', "\\|");
     Ok(format!("| [{id}]({id}.md) | {title} | {} | {verdict} |\n", origins(&cells)))
 }
@@ -81,7 +82,10 @@ mod tests {
         let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
         write("figure-3.1.md", "# figure-3.1: A | B\n");
         write("table-3.10.md", "# table-3.10: later\n");
-        write("table-3.9.md", "# table-3.9: Sizes\n\nAgainst the thesis: 1 of 2 numbers read the same.\n");
+        write(
+            "table-3.9.md",
+            "# table-3.9: Sizes\n\nAgainst the thesis: 1 of 2 numbers read the same.\n",
+        );
         write(
             "table-3.9.csv",
             "row,column,value,thesis,definition,provenance,n,low,high,interval,note\n\
@@ -89,7 +93,8 @@ mod tests {
         );
         write(FILE, "old");
         let text = index(folder.path()).unwrap();
-        let lines: Vec<&str> = text.lines().skip_while(|line| !line.starts_with("|---")).skip(1).collect();
+        let lines: Vec<&str> =
+            text.lines().skip_while(|line| !line.starts_with("|---")).skip(1).collect();
         assert_eq!(
             lines,
             [

@@ -70,7 +70,7 @@ impl Report {
         if let Some(sheet) = &self.sheet {
             replace(&path("png"), &sheet.png)?;
         }
-        replace(&folder.join(index::FILE), index::index(folder)?.as_bytes())
+        Ok(replace(&folder.join(index::FILE), index::index(folder)?.as_bytes())?)
     }
 
     /// Compares with the committed files in a folder and with the expected numbers.

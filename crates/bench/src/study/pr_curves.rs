@@ -41,7 +41,12 @@ pub(super) fn run(
 }
 
 fn panel() -> Panel {
-    Panel { x_label: "recall".into(), y_label: "precision".into(), settled_from: Some(SETTLED), ..Panel::default() }
+    Panel {
+        x_label: "recall".into(),
+        y_label: "precision".into(),
+        settled_from: Some(SETTLED),
+        ..Panel::default()
+    }
 }
 
 /// `(recall, precision)` of the published definition, recall ascending.

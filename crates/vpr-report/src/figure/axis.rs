@@ -22,8 +22,9 @@ impl Axis {
         named: &[(f64, String)],
     ) -> Self {
         let values = values.filter_map(|value| transform(scale, value));
-        let (low, high) = values
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), it| (low.min(it), high.max(it)));
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), it| {
+            (low.min(it), high.max(it))
+        });
         let (low, high) = if low > high {
             (0.0, 1.0)
         } else if high - low <= 1e-12 * low.abs() {
@@ -72,7 +73,8 @@ impl Axis {
         let every = usize::try_from(last - first).unwrap_or(1) as f64 / (2.0 * n).max(1.0);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few")]
         let every = every.ceil().max(1.0) as usize;
-        let powers = (first..=last).step_by(every).flat_map(|it| within.iter().map(move |f| (it, f)));
+        let powers =
+            (first..=last).step_by(every).flat_map(|it| within.iter().map(move |f| (it, f)));
         powers
             .filter_map(|(power, factor)| {
                 let value = factor * 10_f64.powi(power);

@@ -91,7 +91,11 @@ fn draw(plan: &Plan<'_>, caption: &str, (tolerance, cell): (i64, i64)) -> String
         let class = classes.join(" ");
         let class = if class.is_empty() { class } else { format!(" class=\"{class}\"") };
         let (x, y) = (number(tenths(text.x)), number(tenths(text.y)));
-        let turn = if text.is_turned { format!(" transform=\"rotate(-90 {x} {y})\"") } else { String::new() };
+        let turn = if text.is_turned {
+            format!(" transform=\"rotate(-90 {x} {y})\"")
+        } else {
+            String::new()
+        };
         out += &format!("<text x=\"{x}\" y=\"{y}\"{class}{turn}>{}</text>\n", escape(&text.text));
     }
     out += "</svg>\n";
@@ -103,7 +107,8 @@ fn description(plan: &Plan<'_>, tolerance: i64) -> String {
     let panels = plan.frames.iter().map(|frame| {
         let panel = frame.multiple.panel;
         let curves = frame.multiple.shown.iter().map(|&index| &panel.curves[index]);
-        let names: BTreeSet<&str> = curves.map(|it| it.name.as_str()).filter(|it| !it.is_empty()).collect();
+        let names: BTreeSet<&str> =
+            curves.map(|it| it.name.as_str()).filter(|it| !it.is_empty()).collect();
         let names = names.into_iter().collect::<Vec<_>>().join(", ");
         let names = if names.is_empty() { names } else { format!(": {names}") };
         format!("{} ({} over {}){names}.", frame.multiple.title, panel.y_label, panel.x_label)
@@ -157,12 +162,17 @@ fn draw_frame(out: &mut String, plan: &Plan<'_>, frame: &Frame<'_>, tolerance: (
                     out.push_str(&marked(style, &path.collect::<String>()));
                     continue;
                 }
-                let path: String = dots.iter().map(|it| format!("M{} {}h0", number(it.0), number(it.1))).collect();
+                let path: String =
+                    dots.iter().map(|it| format!("M{} {}h0", number(it.0), number(it.1))).collect();
                 out.push_str(&format!("<path class=\"p c{colour}\" d=\"{path}\"/>\n"));
             }
             Shape::Thesis => {
-                let path = places(frame, &curve.points).into_iter().map(|it| outline(style.mark, it, 4.2));
-                out.push_str(&format!("<path class=\"w c{colour}\" d=\"{}\"/>\n", path.collect::<String>()));
+                let path =
+                    places(frame, &curve.points).into_iter().map(|it| outline(style.mark, it, 4.2));
+                out.push_str(&format!(
+                    "<path class=\"w c{colour}\" d=\"{}\"/>\n",
+                    path.collect::<String>()
+                ));
             }
             Shape::Line => {
                 let path = line(frame, &curve.points, tolerance.0);
@@ -239,7 +249,8 @@ fn marks(places: &[Place], nth: usize) -> Vec<Place> {
     };
     let length: f64 = places.windows(2).map(step).sum();
     let shift = (nth % 8) as f64 / 8.0;
-    let mut wanted = (0..MARKS).map(|it| (it as f64 + 0.1 + 0.8 * shift) / MARKS as f64 * length).peekable();
+    let mut wanted =
+        (0..MARKS).map(|it| (it as f64 + 0.1 + 0.8 * shift) / MARKS as f64 * length).peekable();
     let (mut way, mut marks) = (0.0, Vec::new());
     for pair in places.windows(2) {
         let reach = way + step(pair);
@@ -272,7 +283,11 @@ fn outline(mark: Mark, (x, y): Place, radius: f64) -> String {
     match mark {
         Mark::Circle => {
             let (r, d) = (number(r), number(2 * r));
-            format!("M{} {}a{r} {r} 0 1 0 {d} 0a{r} {r} 0 1 0 -{d} 0Z", number(x - tenths(radius)), number(y))
+            format!(
+                "M{} {}a{r} {r} 0 1 0 {d} 0a{r} {r} 0 1 0 -{d} 0Z",
+                number(x - tenths(radius)),
+                number(y)
+            )
         }
         Mark::Square => corners(&[45.0, 135.0, 225.0, 315.0], &[1.25]),
         Mark::Triangle => corners(&[90.0, 210.0, 330.0], &[1.35]),

@@ -19,6 +19,7 @@ use serde::Serialize;
 use vpr_core::Provenance;
 
 pub(crate) use text::escape;
+pub(crate) use theme::styles;
 pub use theme::{COLOURS, DARK_COLOURS, Mark, Style, style_of};
 
 /// A figure: panels side by side.

@@ -40,12 +40,14 @@ fn split(panel: &Panel) -> Vec<Multiple<'_>> {
         let length = names.len().div_ceil(parts).max(1);
         for part in 0..parts {
             let names: Vec<&str> = names.iter().skip(part * length).take(length).copied().collect();
-            let is_shown = |curve: &Curve| curve.origin == origin && names.contains(&curve.name.as_str());
+            let is_shown =
+                |curve: &Curve| curve.origin == origin && names.contains(&curve.name.as_str());
             let (shown, grey): (Vec<usize>, Vec<usize>) =
                 (0..panel.curves.len()).partition(|&index| is_shown(&panel.curves[index]));
             let of_origin = origin.filter(|_| origins.len() > 1);
             let of_origin = of_origin.map_or(String::new(), |origin| format!(", {origin}"));
-            let of_parts = if parts > 1 { format!(" ({} of {parts})", part + 1) } else { String::new() };
+            let of_parts =
+                if parts > 1 { format!(" ({} of {parts})", part + 1) } else { String::new() };
             let title = format!("{}{of_origin}{of_parts}", panel.title);
             // What is grey must not hide what is shown.
             let grey = grey.into_iter().filter(|&it| panel.curves[it].shape == Shape::Line);

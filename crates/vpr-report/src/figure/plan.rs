@@ -152,7 +152,8 @@ pub(super) fn plan<'a>(multiples: &'a [Multiple<'a>], caption: &str) -> Plan<'a>
     };
     let mut top = head(&mut plan, multiples, caption, is_direct);
     let shares_y = all_same(multiples.iter().map(|it| it.panel.y_label.as_str()));
-    for (row, (multiples, axes)) in multiples.chunks(columns).zip(axes.chunks(columns)).enumerate() {
+    for (row, (multiples, axes)) in multiples.chunks(columns).zip(axes.chunks(columns)).enumerate()
+    {
         let titles: Vec<Vec<String>> = multiples
             .iter()
             .map(|it| wrap(&it.title, TITLE, plot_width + right - 10.0, 4))
@@ -197,7 +198,11 @@ fn axes(multiple: &Multiple<'_>, plot_width: f64, plot_height: f64) -> (Axis, Ax
     let points = || panel.curves.iter().flat_map(|it| it.points.iter().filter(finite));
     let is_settled = |x: f64| panel.settled_from.is_none_or(|from| x >= from);
     let settled = || points().filter(|point| is_settled(point.0));
-    let heights = if settled().next().is_some() { settled().map(|it| it.1).collect() } else { points().map(|it| it.1).collect::<Vec<_>>() };
+    let heights = if settled().next().is_some() {
+        settled().map(|it| it.1).collect()
+    } else {
+        points().map(|it| it.1).collect::<Vec<_>>()
+    };
     let bands = panel.curves.iter().flat_map(|it| it.band.iter().flat_map(|it| [it.0, it.1]));
     (
         Axis::over(points().map(|it| it.0), panel.x_scale, plot_width / 60.0, &panel.x_ticks),
@@ -235,7 +240,8 @@ fn head(plan: &mut Plan<'_>, multiples: &[Multiple<'_>], caption: &str, is_direc
                 is_here && !is_said(it, name)
             })
         };
-        let shape = |name: &str| curves().find(|it| it.name == name).map_or(Shape::Line, |it| it.shape);
+        let shape =
+            |name: &str| curves().find(|it| it.name == name).map_or(Shape::Line, |it| it.shape);
         let styles = plan.styles.iter().filter(|it| unsaid(it.0));
         entries.extend(styles.map(|&(name, style)| (name, style, shape(name))));
     }

@@ -8,22 +8,43 @@ use vpr_core::Provenance::{Generated, Measured, Published};
 use super::{Curve, Figure, Panel, Scale, Shape, multiples::multiples, plan::plan, text::width};
 
 const TECHNIQUES: [&str; 10] = [
-    "NetVLAD", "RegionVLAD", "CoHOG", "HOG", "AlexNet", "AMOSNet", "HybridNet", "CALC", "AP-GeM",
+    "NetVLAD",
+    "RegionVLAD",
+    "CoHOG",
+    "HOG",
+    "AlexNet",
+    "AMOSNet",
+    "HybridNet",
+    "CALC",
+    "AP-GeM",
     "DenseVLAD",
 ];
 const RUNNING: [&str; 5] =
     ["HOG", "HOG, thesis configuration", "CoHOG", "default network", "NetVLAD, MobileNetV2"];
 const ESTIMATORS: [&str; 15] = [
-    "L2-distance", "PA-Score", "SUE", "SUE, as released", "SUE, eqs. 5.1–5.3",
-    "Similarity distribution", "Ratio spread", "Statistical uncertainty", "BTL", "STUN",
-    "SIFT-RANSAC", "XFeat-RANSAC", "DISK-RANSAC", "Super-RANSAC", "DELF-RANSAC",
+    "L2-distance",
+    "PA-Score",
+    "SUE",
+    "SUE, as released",
+    "SUE, eqs. 5.1–5.3",
+    "Similarity distribution",
+    "Ratio spread",
+    "Statistical uncertainty",
+    "BTL",
+    "STUN",
+    "SIFT-RANSAC",
+    "XFeat-RANSAC",
+    "DISK-RANSAC",
+    "Super-RANSAC",
+    "DELF-RANSAC",
 ];
 
 /// Numbers between 0 and 1 that look random and are always the same.
 fn noise(seed: usize) -> impl FnMut() -> f64 {
     let mut state = seed as u64 * 7919 + 12345;
     move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as f64 / (1_u64 << 31) as f64
     }
 }
@@ -59,9 +80,16 @@ fn chapter_3(title: &str, axes: (&str, &str), n: usize, has_stored: bool) -> Pan
 
 fn curves_of_chapter_3() -> Figure {
     let titles = [
-        "SPEDTest", "Corridor", "GardensPoint thumbnails", "ESSEX3IN1 thumbnails",
-        "Nordland 64×32, 100 frames", "Generated fixture", "street (generated)",
-        "campus (generated)", "corridor (generated)", "rail (generated)",
+        "SPEDTest",
+        "Corridor",
+        "GardensPoint thumbnails",
+        "ESSEX3IN1 thumbnails",
+        "Nordland 64×32, 100 frames",
+        "Generated fixture",
+        "street (generated)",
+        "campus (generated)",
+        "corridor (generated)",
+        "rail (generated)",
     ];
     let axes = ("recall", "precision");
     let settled = |panel| Panel { settled_from: Some(0.02), ..panel };
@@ -84,10 +112,15 @@ fn exchanged() -> Figure {
 fn speeds() -> Figure {
     let panel = |(index, name): (usize, &&str)| {
         let level = |size: usize| 800.0 / (0.3 + index as f64 + 0.4 * size as f64);
-        let mut curves =
-            vec![Curve::new("required", (0..60).map(|v| (f64::from(v), 2.0 * f64::from(v))).collect())];
+        let mut curves = vec![Curve::new(
+            "required",
+            (0..60).map(|v| (f64::from(v), 2.0 * f64::from(v))).collect(),
+        )];
         for size in [1, 10, 100, 500, 1000, 5000] {
-            curves.push(Curve::new(format!("Z={size}"), vec![(0.0, level(size)), (59.0, level(size))]));
+            curves.push(Curve::new(
+                format!("Z={size}"),
+                vec![(0.0, level(size)), (59.0, level(size))],
+            ));
         }
         let panel = panel(name, ("platform speed, m/s", "frames per second"), curves);
         Panel { y_scale: Scale::Log, ..panel }
@@ -125,7 +158,8 @@ fn estimators(n_panels: usize, names: &[&str]) -> Figure {
 fn sweep() -> Figure {
     let over = |values: &[f64]| {
         let mut panels = Vec::new();
-        for (at, dataset) in ["Corridor", "GardensPoint thumbnails", "generated"].iter().enumerate() {
+        for (at, dataset) in ["Corridor", "GardensPoint thumbnails", "generated"].iter().enumerate()
+        {
             let names = TECHNIQUES.iter().chain(&RUNNING).enumerate();
             let curves = names.map(|(index, name)| {
                 let mut random = noise(at * 30 + index);
@@ -150,7 +184,8 @@ fn clouds() -> Figure {
         (0..n).map(|_| (random() + random(), -6.0 * random() * random())).collect()
     };
     let one = |index: usize| {
-        let line = |by: f64| (0..40).map(|x| (f64::from(x) / 20.0, by - f64::from(x) / 10.0)).collect();
+        let line =
+            |by: f64| (0..40).map(|x| (f64::from(x) / 20.0, by - f64::from(x) / 10.0)).collect();
         let curves = vec![
             Curve::new("correct", cloud(index, 9000)).shaped(Shape::Points),
             Curve::new("wrong", cloud(index + 9, 3000)).shaped(Shape::Points),
@@ -198,13 +233,24 @@ fn figures() -> Vec<(&'static str, Figure)> {
         (
             "figure-3.13",
             Figure {
-                panels: vec![chapter_3("street-new-places (generated)", ("FPR", "TPR"), 200, false)],
+                panels: vec![chapter_3(
+                    "street-new-places (generated)",
+                    ("FPR", "TPR"),
+                    200,
+                    false,
+                )],
             },
         ),
         ("figure-3.15", exchanged()),
         ("figure-3.18", speeds()),
         ("figure-3.19", invariance()),
-        ("figure-5.1", estimators(1, &["L2-distance", "PA-Score", "SUE", "Statistical uncertainty", "SIFT-RANSAC"])),
+        (
+            "figure-5.1",
+            estimators(
+                1,
+                &["L2-distance", "PA-Score", "SUE", "Statistical uncertainty", "SIFT-RANSAC"],
+            ),
+        ),
         ("figure-5.7", sweep()),
         ("figure-5.8", estimators(3, &ESTIMATORS)),
         ("figure-5.9", histograms()),
@@ -249,7 +295,11 @@ fn texts(svg: &str) -> Vec<Bounds> {
         let back = if class.contains('s') { 0.5 } else { f64::from(class.contains('e')) };
         let start = -back * length;
         if head.contains("rotate(-90") {
-            return Bounds { what: text, x: [x - size * 0.8, x + 2.0], y: [y - length - start, y - start] };
+            return Bounds {
+                what: text,
+                x: [x - size * 0.8, x + 2.0],
+                y: [y - length - start, y - start],
+            };
         }
         Bounds { what: text, x: [x + start, x + start + length], y: [y - size * 0.75, y + 2.0] }
     };
@@ -259,11 +309,13 @@ fn texts(svg: &str) -> Vec<Bounds> {
 /// The boxes of everything that is drawn with one of these classes.
 fn drawn(svg: &str, classes: &[char]) -> Vec<Bounds> {
     let elements = svg.lines().filter(|line| {
-        line.starts_with("<path") && attribute(line, "class").is_some_and(|it| it.starts_with(classes))
+        line.starts_with("<path")
+            && attribute(line, "class").is_some_and(|it| it.starts_with(classes))
     });
     let of = |line: &str| {
         let data = attribute(line, "d").unwrap();
-        let mut bounds = Bounds { what: line[..line.len().min(40)].into(), x: [1e9, -1e9], y: [1e9, -1e9] };
+        let mut bounds =
+            Bounds { what: line[..line.len().min(40)].into(), x: [1e9, -1e9], y: [1e9, -1e9] };
         for piece in data.split(['M', 'L']).filter(|it| !it.is_empty()) {
             let end = piece.find(|it: char| it.is_ascii_alphabetic()).unwrap_or(piece.len());
             let (x, y) = piece[..end].split_once(' ').unwrap();
@@ -291,7 +343,7 @@ fn names_stay_off_the_curves_and_inside_of_the_picture() {
         for (index, text) in texts.iter().enumerate() {
             let is_inside = text.x[0] >= 0.0 && text.y[0] >= 0.0;
             let is_inside = is_inside && text.x[1] <= side("width") && text.y[1] <= side("height");
-        assert!(is_inside, "{id}: {} is outside of the picture", text.what);
+            assert!(is_inside, "{id}: {} is outside of the picture", text.what);
             let over = curves.iter().find(|curve| curve.overlaps(text));
             assert!(over.is_none(), "{id}: {text:?} lies over {over:?}");
             let other = texts[..index].iter().find(|it| it.overlaps(text));
@@ -328,7 +380,8 @@ fn no_two_curves_of_a_panel_look_alike_and_eight_are_enough() {
 fn every_name_is_told_and_every_curve_drawn() {
     let svg = chapter_3("Corridor", ("recall", "precision"), 100, true);
     let svg = Figure { panels: vec![svg] }.svg("caption");
-    for name in TECHNIQUES.iter().chain(&["NetVLAD, MobileNetV2", "recall", "precision", "caption"]) {
+    for name in TECHNIQUES.iter().chain(&["NetVLAD, MobileNetV2", "recall", "precision", "caption"])
+    {
         assert!(svg.contains(&format!(">{name}</text>")), "{name}");
     }
     assert_eq!(svg.matches("class=\"l c").count(), 15);

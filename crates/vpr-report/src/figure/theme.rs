@@ -119,7 +119,7 @@ pub fn style_of(name: &str) -> Option<Style> {
 
 /// One style per name, the same for the same list: known names have their own, others take what is
 /// left, a colour that nobody has as long as there is one.
-pub(super) fn styles<'a>(names: &[&'a str]) -> Vec<(&'a str, Style)> {
+pub(crate) fn styles<'a>(names: &[&'a str]) -> Vec<(&'a str, Style)> {
     let mut styles: Vec<(&str, Style)> =
         names.iter().filter_map(|&name| Some((name, style_of(name)?))).collect();
     for &name in names {

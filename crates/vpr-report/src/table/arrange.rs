@@ -51,7 +51,8 @@ impl<'a> Pivot<'a> {
                 let thesis = |column: &&str| {
                     let cell =
                         cells.iter().find(|cell| cell.column == *column && cell.thesis.is_some());
-                    cell.and_then(|cell| cell.thesis.as_ref()).map_or_else(String::new, number::text)
+                    cell.and_then(|cell| cell.thesis.as_ref())
+                        .map_or_else(String::new, number::text)
                 };
                 let entries = columns.iter().map(thesis).collect();
                 lines.push(Line { row, origin: "thesis".to_owned(), definition: None, entries });

@@ -42,11 +42,8 @@ impl Notes {
             }
         }
         for column in columns {
-            let of: Vec<Option<usize>> = valued
-                .iter()
-                .filter(|it| it.column == column)
-                .map(|it| notes.find(it))
-                .collect();
+            let of: Vec<Option<usize>> =
+                valued.iter().filter(|it| it.column == column).map(|it| notes.find(it)).collect();
             if let (Some(Some(first)), true) = (of.first(), of.len() > 1)
                 && of.iter().all(|it| *it == Some(*first))
             {

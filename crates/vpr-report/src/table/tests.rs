@@ -49,7 +49,13 @@ fn tables() -> [Table; 3] {
                 let value = 0.4 + 0.047 * index as f64 - 0.1 * f64::from(line);
                 let cell = |definition| {
                     let row = format!("{row} {line}");
-                    let cell = Cell::new(row, format!("technique {index}"), value, Provenance::Measured, 9);
+                    let cell = Cell::new(
+                        row,
+                        format!("technique {index}"),
+                        value,
+                        Provenance::Measured,
+                        9,
+                    );
                     let mut cell = cell.defined(definition);
                     cell.thesis = Some(Value::Number((value * 100.0).floor() / 100.0));
                     if index % 3 == 0 { cell.noted(format!("note {index}")) } else { cell }
@@ -62,7 +68,11 @@ fn tables() -> [Table; 3] {
         table.push(Cell::new(format!("{row} 1"), "a word", "falls", Provenance::Measured, 9));
         table
     };
-    [table(2, "street"), table(16, "street"), table(16, "7-Scenes RedKitchen / a long encoder's name")]
+    [
+        table(2, "street"),
+        table(16, "street"),
+        table(16, "7-Scenes RedKitchen / a long encoder's name"),
+    ]
 }
 
 /// The printed entries of a Markdown text by row, line label and column.
@@ -85,14 +95,20 @@ fn entries(markdown: &str) -> BTreeMap<(String, String, String), String> {
             // A row of its own may be turned: its lines are then columns.
             let is_turned = heading.is_some() && header[1..].iter().any(|it| it == "thesis");
             let n_labels = if heading.is_some() { 1 } else { 3 };
-            for (head, cell) in header.iter().zip(&cells).skip(n_labels).filter(|it| !it.1.is_empty()) {
+            for (head, cell) in
+                header.iter().zip(&cells).skip(n_labels).filter(|it| !it.1.is_empty())
+            {
                 let (row, label) = match &heading {
                     Some(row) => (row.clone(), cells[0].clone()),
                     None => (cells[0].clone(), [&*cells[1], &*cells[2]].join(", ")),
                 };
-                let (label, head) = if is_turned { (head.clone(), label) } else { (label, head.clone()) };
+                let (label, head) =
+                    if is_turned { (head.clone(), label) } else { (label, head.clone()) };
                 let label = label.trim_end_matches(", ").to_owned();
-                assert!(entries.insert((row, label, bare(&head)), bare(cell)).is_none(), "twice: {line}");
+                assert!(
+                    entries.insert((row, label, bare(&head)), bare(cell)).is_none(),
+                    "twice: {line}"
+                );
             }
         }
     }
@@ -127,7 +143,8 @@ fn all_formats_say_the_same_cell_by_cell() {
             let key = |label: String| (cell.row.clone(), label, cell.column.clone());
             let definition = cell.definition.as_ref().map_or(String::new(), |it| format!(", {it}"));
             let label = format!("{}{definition}", cell.provenance);
-            let entry = printed.remove(&key(label)).unwrap_or_else(|| panic!("{cell:?}: not printed"));
+            let entry =
+                printed.remove(&key(label)).unwrap_or_else(|| panic!("{cell:?}: not printed"));
             assert!(reads_like(&entry, cell.value.as_ref()), "{entry}: {cell:?}");
             // Both definitions share the line of the thesis.
             if let (Some(thesis), Some("corrected")) = (&cell.thesis, cell.definition.as_deref()) {
