@@ -31,6 +31,7 @@ mod store;
 mod stored;
 mod subject;
 pub mod technique;
+mod thumbnail;
 pub mod verification;
 
 pub use describe::{Describe, Features, Matched};
@@ -46,6 +47,7 @@ pub use store::Store;
 pub use stored::Stored;
 pub use subject::Subject;
 pub use technique::{Runner, Technique};
+pub use thumbnail::thumbnails;
 
 /// The examples of the README, as tests.
 #[cfg(doctest)]

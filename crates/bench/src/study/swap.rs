@@ -71,11 +71,10 @@ fn draw(figure: &mut Figure, subject: &Subject, x: f64, auc: f64) {
         y_label: "AUC-PR (published)".into(),
         ..Panel::default()
     });
-    match panel.curves.iter_mut().find(is_same) {
-        Some(curve) => curve.points.push((x, auc)),
-        None => {
-            let curve = Curve::new(subject.column, vec![(x, auc)]).of(subject.provenance);
-            panel.curves.push(curve);
-        }
+    if let Some(curve) = panel.curves.iter_mut().find(is_same) {
+        curve.points.push((x, auc));
+        return;
     }
+    let curve = Curve::new(subject.column, vec![(x, auc)]).of(subject.provenance);
+    panel.curves.push(curve);
 }

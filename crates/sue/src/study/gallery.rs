@@ -89,7 +89,7 @@ fn ranks(uncertainty: &[f64]) -> Vec<f64> {
 fn column(opened: &Labelled, query: usize, n: usize, remark: String) -> Vec<Tile> {
     let retrieval = &opened.corpus.retrieval;
     let correct = |reference: usize| opened.corpus.truth.is_correct(query, reference);
-    let ranked = retrieval.indices(query).iter().zip(retrieval.distances(query)).take(n);
+    let ranked = retrieval.indices(query).into_iter().zip(retrieval.distances(query)).take(n);
     let framed = ranked.map(|(&it, &distance)| Tile {
         frame: Frame::Reference(it, correct(it)),
         remark: format!("d {}", short(f64::from(distance))),

@@ -1,6 +1,6 @@
 //! A figure as an SVG document.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, fmt::Write as _};
 
 use super::{
     COLOURS, Curve, Figure, Mark, Shape, Style,
@@ -56,7 +56,7 @@ fn style() -> String {
          .p{{fill:none;stroke:currentColor;stroke-width:3.4;stroke-linecap:round;opacity:.65}}"
     );
     for (index, colour) in COLOURS.iter().enumerate() {
-        style += &format!(".c{index}{{color:{colour}}}");
+        let _ = write!(style, ".c{index}{{color:{colour}}}");
     }
     style
 }
@@ -96,7 +96,11 @@ fn draw(plan: &Plan<'_>, caption: &str, (tolerance, cell): (i64, i64)) -> String
         } else {
             String::new()
         };
-        out += &format!("<text x=\"{x}\" y=\"{y}\"{class}{turn}>{}</text>\n", escape(&text.text));
+        let _ = write!(
+            out,
+            "<text x=\"{x}\" y=\"{y}\"{class}{turn}>{}</text>\n",
+            escape(&text.content)
+        );
     }
     out += "</svg>\n";
     out
@@ -117,25 +121,30 @@ fn description(plan: &Plan<'_>, tolerance: i64) -> String {
     format!("{panels} Lines are within {} pixels of their points.", number(tolerance))
 }
 
-fn draw_frame(out: &mut String, plan: &Plan<'_>, frame: &Frame<'_>, tolerance: (i64, i64)) {
+/// Axes, and light lines at their numbers.
+fn draw_grid(out: &mut String, frame: &Frame<'_>) {
     let Rect { x, y, width, height } = frame.plot;
     let mut grid = String::new();
     for (share, _) in &frame.y.ticks {
         let at = number(tenths(y + 6.0 + (1.0 - share) * (height - 12.0)));
-        grid += &format!("M{} {at}H{}", number(tenths(x)), number(tenths(x + width)));
+        let _ = write!(grid, "M{} {at}H{}", number(tenths(x)), number(tenths(x + width)));
     }
     for (share, _) in &frame.x.ticks {
         let at = number(tenths(x + 6.0 + share * (width - 12.0)));
-        grid += &format!("M{at} {}V{}", number(tenths(y)), number(tenths(y + height)));
+        let _ = write!(grid, "M{at} {}V{}", number(tenths(y)), number(tenths(y + height)));
     }
-    out.push_str(&format!("<path class=\"g\" d=\"{grid}\"/>\n"));
+    let _ = write!(out, "<path class=\"g\" d=\"{grid}\"/>\n");
     let (left, top) = (number(tenths(x)), number(tenths(y)));
     let (right, bottom) = (number(tenths(x + width)), number(tenths(y + height)));
-    out.push_str(&format!("<path class=\"a\" d=\"M{left} {top}V{bottom}H{right}\"/>\n"));
+    let _ = write!(out, "<path class=\"a\" d=\"M{left} {top}V{bottom}H{right}\"/>\n");
+}
+
+fn draw_frame(out: &mut String, plan: &Plan<'_>, frame: &Frame<'_>, tolerance: (i64, i64)) {
+    draw_grid(out, frame);
     let curves = &frame.multiple.panel.curves;
     for &index in &frame.multiple.grey {
         let line = line(frame, &curves[index].points, tolerance.0);
-        out.push_str(&format!("<path class=\"o\" d=\"{line}\"/>\n"));
+        let _ = write!(out, "<path class=\"o\" d=\"{line}\"/>\n");
     }
     let style = |curve: &Curve| plan.styles.iter().find(|it| it.0 == curve.name).map(|it| it.1);
     let shown = || {
@@ -149,34 +158,35 @@ fn draw_frame(out: &mut String, plan: &Plan<'_>, frame: &Frame<'_>, tolerance: (
         let (low, mut high) = (edge(|it| it.0), edge(|it| it.1));
         high.reverse();
         let around = line(frame, &[low, high].concat(), tolerance.0);
-        out.push_str(&format!("<path class=\"b c{}\" d=\"{around}Z\"/>\n", style.colour));
+        let _ = write!(out, "<path class=\"b c{}\" d=\"{around}Z\"/>\n", style.colour);
     }
     for (nth, (curve, style)) in shown().enumerate() {
         let colour = style.colour;
         match curve.shape {
             Shape::Points => {
-                let (cell, shift) = (tolerance.1, tolerance.1 / 2 * (nth % 2) as i64);
+                let (cell, shift) = (tolerance.1, if nth % 2 == 0 { 0 } else { tolerance.1 / 2 });
                 let dots = scatter(&places(frame, &curve.points), cell, shift);
                 if dots.len() <= APART {
                     let path = dots.into_iter().map(|it| outline(style.mark, it, 2.2));
                     out.push_str(&marked(style, &path.collect::<String>()));
                     continue;
                 }
-                let path: String =
-                    dots.iter().map(|it| format!("M{} {}h0", number(it.0), number(it.1))).collect();
-                out.push_str(&format!("<path class=\"p c{colour}\" d=\"{path}\"/>\n"));
+                let dots = dots.iter().map(|it| format!("M{} {}h0", number(it.0), number(it.1)));
+                let path = dots.collect::<Vec<_>>().concat();
+                let _ = write!(out, "<path class=\"p c{colour}\" d=\"{path}\"/>\n");
             }
             Shape::Thesis => {
                 let path =
                     places(frame, &curve.points).into_iter().map(|it| outline(style.mark, it, 4.2));
-                out.push_str(&format!(
+                let _ = write!(
+                    out,
                     "<path class=\"w c{colour}\" d=\"{}\"/>\n",
                     path.collect::<String>()
-                ));
+                );
             }
             Shape::Line => {
                 let path = line(frame, &curve.points, tolerance.0);
-                out.push_str(&format!("<path class=\"l c{colour}\" d=\"{path}\"/>\n"));
+                let _ = write!(out, "<path class=\"l c{colour}\" d=\"{path}\"/>\n");
                 let marks = marks(&places(frame, &curve.points), nth);
                 let path = marks.into_iter().map(|it| outline(style.mark, it, 3.6));
                 out.push_str(&marked(style, &path.collect::<String>()));
@@ -189,23 +199,29 @@ fn draw_key(out: &mut String, key: &Key) {
     let colour = key.style.colour;
     let (x, y) = (tenths(key.x), tenths(key.y));
     match key.leader {
-        Some((from_x, from_y)) => out.push_str(&format!(
-            "<path class=\"h c{colour}\" d=\"M{} {}L{} {}\"/>\n",
-            number(tenths(from_x)),
-            number(tenths(from_y)),
-            number(x - 60),
-            number(y)
-        )),
-        None if key.shape == Shape::Line => out.push_str(&format!(
-            "<path class=\"l c{colour}\" d=\"M{} {}h16\"/>\n",
-            number(x - 80),
-            number(y)
-        )),
+        Some((from_x, from_y)) => {
+            let _ = write!(
+                out,
+                "<path class=\"h c{colour}\" d=\"M{} {}L{} {}\"/>\n",
+                number(tenths(from_x)),
+                number(tenths(from_y)),
+                number(x - 60),
+                number(y)
+            );
+        }
+        None if key.shape == Shape::Line => {
+            let _ = write!(
+                out,
+                "<path class=\"l c{colour}\" d=\"M{} {}h16\"/>\n",
+                number(x - 80),
+                number(y)
+            );
+        }
         None => {}
     }
     let path = outline(key.style.mark, (x, y), 3.6);
     if key.shape == Shape::Thesis {
-        out.push_str(&format!("<path class=\"w c{colour}\" d=\"{path}\"/>\n"));
+        let _ = write!(out, "<path class=\"w c{colour}\" d=\"{path}\"/>\n");
     } else {
         out.push_str(&marked(key.style, &path));
     }
@@ -230,7 +246,7 @@ fn line(frame: &Frame<'_>, points: &[(f64, f64)], tolerance: i64) -> String {
     for piece in points.split(|point| !is_shown(point)) {
         for (index, place) in simplify(&places(frame, piece), tolerance).into_iter().enumerate() {
             let command = if index == 0 { 'M' } else { 'L' };
-            path += &format!("{command}{} {}", number(place.0), number(place.1));
+            let _ = write!(path, "{command}{} {}", number(place.0), number(place.1));
         }
     }
     path

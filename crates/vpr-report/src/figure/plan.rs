@@ -45,7 +45,7 @@ pub(super) struct Text {
     pub(super) x: f64,
     /// Its base line.
     pub(super) y: f64,
-    pub(super) text: String,
+    pub(super) content: String,
     pub(super) anchor: Anchor,
     pub(super) is_title: bool,
     /// Whether it is read from below.
@@ -282,8 +282,8 @@ fn head(plan: &mut Plan<'_>, multiples: &[Multiple<'_>], caption: &str, is_direc
 
 impl Plan<'_> {
     fn line(&mut self, x: f64, y: f64, text: &str, anchor: Anchor, is_title: bool) {
-        let text = text.to_owned();
-        self.texts.push(Text { x, y, text, anchor, is_title, is_turned: false });
+        let content = text.to_owned();
+        self.texts.push(Text { x, y, content, anchor, is_title, is_turned: false });
     }
 
     /// The label of a vertical axis, its last line at `x`.
@@ -293,7 +293,7 @@ impl Plan<'_> {
             self.texts.push(Text {
                 x: x - LINE * index as f64,
                 y,
-                text: line.clone(),
+                content: line.clone(),
                 anchor: Anchor::Middle,
                 is_title: false,
                 is_turned: true,

@@ -5,7 +5,7 @@ pub(super) fn width(text: &str, size: f64) -> f64 {
     size * text.chars().map(em).sum::<f64>()
 }
 
-/// Width of a character in units of the font size: DejaVu Sans, the widest of the usual fonts.
+/// Width of a character in units of the font size: `DejaVu Sans`, the widest of the usual fonts.
 fn em(it: char) -> f64 {
     match it {
         'i' | 'j' | 'l' | '\'' | '|' => 0.29,

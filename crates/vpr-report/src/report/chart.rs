@@ -7,7 +7,7 @@ use crate::figure::{Mark, Style};
 
 /// The picture and the plot inside of it, in its own units; the script knows them too.
 const SIZE: (f64, f64) = (340.0, 250.0);
-const PLOT: (f64, f64, f64, f64) = (44.0, 10.0, 284.0, 196.0);
+const PLOT: (f64, f64, f64, f64) = (56.0, 10.0, 272.0, 196.0);
 /// Most points of a line; the script shows their values.
 const POINTS: usize = 160;
 
@@ -56,8 +56,8 @@ impl Chart<'_> {
     /// Writes the chart as a figure.
     pub(super) fn write(&self, out: &mut dyn Write) -> io::Result<()> {
         let (width, height) = SIZE;
-        let (left, top, plot_width, plot_height) = PLOT;
-        let (id, bottom) = (self.id, top + plot_height);
+        let (_, top, _, plot_height) = PLOT;
+        let id = self.id;
         writeln!(
             out,
             "<figure class=\"chart\"><figcaption>{}</figcaption>\n<svg viewBox=\"0 0 {width} {height}\" \
@@ -69,6 +69,24 @@ impl Chart<'_> {
             self.y.0,
             self.y.1
         )?;
+        self.write_axes(out)?;
+        self.write_lines(out)?;
+        if let Some((run, cut)) = self.cut {
+            let at = self.place((cut, self.y.0)).0;
+            writeln!(
+                out,
+                "<path class=\"cut\" data-run=\"{run}\" d=\"M{at:.1} {top}v{plot_height}\"/>"
+            )?;
+        }
+        writeln!(
+            out,
+            "<path class=\"chosen\"/><path class=\"cursor\"/></svg>\n<output class=\"values\"></output></figure>"
+        )
+    }
+
+    fn write_axes(&self, out: &mut dyn Write) -> io::Result<()> {
+        let (left, top, plot_width, plot_height) = PLOT;
+        let bottom = top + plot_height;
         writeln!(out, "<path class=\"axis\" d=\"M{left} {top}V{bottom}H{}\"/>", left + plot_width)?;
         for step in 0..=4 {
             let share = f64::from(step) / 4.0;
@@ -92,11 +110,15 @@ impl Chart<'_> {
             "<text class=\"mid\" x=\"{}\" y=\"{}\">{}</text>\
              <text class=\"mid\" transform=\"rotate(-90 12 {y})\" x=\"12\" y=\"{y}\">{}</text>",
             left + plot_width / 2.0,
-            height - 8.0,
+            SIZE.1 - 8.0,
             escape(self.x_label),
             escape(self.y_label),
             y = top + plot_height / 2.0,
         )?;
+        Ok(())
+    }
+
+    fn write_lines(&self, out: &mut dyn Write) -> io::Result<()> {
         for (nth, line) in self.lines.iter().enumerate() {
             let Style { colour, mark } = line.style;
             let points = thin(&line.points);
@@ -104,7 +126,11 @@ impl Chart<'_> {
                 let low = line.points.iter().zip(&line.band).map(|(point, band)| (point.0, band.0));
                 let high = line.points.iter().zip(&line.band).rev();
                 let high = high.map(|(point, band)| (point.0, band.1));
-                writeln!(out, "<path class=\"band c{colour}\" d=\"{}Z\"/>", self.path(low.chain(high)))?;
+                writeln!(
+                    out,
+                    "<path class=\"band c{colour}\" d=\"{}Z\"/>",
+                    self.path(low.chain(high))
+                )?;
             }
             writeln!(
                 out,
@@ -122,14 +148,7 @@ impl Chart<'_> {
                 .collect();
             writeln!(out, "<path class=\"{} c{colour}\" d=\"{marks}\"/>", class(mark))?;
         }
-        if let Some((run, cut)) = self.cut {
-            let at = self.place((cut, self.y.0)).0;
-            writeln!(out, "<path class=\"cut\" data-run=\"{run}\" d=\"M{at:.1} {top}v{plot_height}\"/>")?;
-        }
-        writeln!(
-            out,
-            "<path class=\"chosen\"/><path class=\"cursor\"/></svg>\n<output class=\"values\"></output></figure>"
-        )
+        Ok(())
     }
 
     /// What the chart shows, for those who hear it.
@@ -151,7 +170,11 @@ impl Chart<'_> {
 }
 
 fn tick(value: f64) -> String {
-    if value.fract().abs() < 1e-9 { format!("{value:.0}") } else { format!("{value:.3}").trim_end_matches('0').to_owned() }
+    if value.fract().abs() < 1e-9 {
+        format!("{value:.0}")
+    } else {
+        format!("{value:.3}").trim_end_matches('0').to_owned()
+    }
 }
 
 /// At most [`POINTS`] points, the ends among them.

@@ -2,7 +2,9 @@
 
 use std::io::{self, Write};
 
-use super::{Dataset, Judged, Report, curves::style, json, map::views, outcome::label, summary::title};
+use super::{
+    Dataset, Judged, Report, curves::style, json, map::views, outcome::label, summary::title,
+};
 
 /// Matches per query that the gallery shows.
 pub(super) const SHOWN: usize = 5;
@@ -35,9 +37,8 @@ fn write_dataset(out: &mut dyn Write, dataset: &Dataset<'_>) -> io::Result<()> {
         write!(out, ",\"{key}0\":{},\"{key}\":{}", json::string(prefix), json::list(rest))?;
     }
     if let Some(truth) = dataset.truth {
-        let first = (0..truth.len()).map(|query| {
-            truth.correct(query).first().map_or("-1".to_owned(), ToString::to_string)
-        });
+        let first = (0..truth.len())
+            .map(|query| truth.correct(query).first().map_or("-1".to_owned(), ToString::to_string));
         write!(out, ",\"t\":{}", json::list(first))?;
     }
     let views = views(dataset);
@@ -70,7 +71,12 @@ fn write_run(
     let truth = report.datasets[run.dataset].truth;
     let name = json::string(&title(report, run));
     let label = json::string(&label(run, judged));
-    write!(out, "{{\"name\":{name},\"by\":{label},\"d\":{},\"c\":{}", run.dataset, style(report, index).colour)?;
+    write!(
+        out,
+        "{{\"name\":{name},\"by\":{label},\"d\":{},\"c\":{}",
+        run.dataset,
+        style(report, index).colour
+    )?;
     write!(out, ",\"th\":{}", json::exact(judged.threshold))?;
     write!(out, ",\"u\":{}", json::list(judged.uncertainty.iter().map(|it| json::exact(*it))))?;
     let lists = |of: &dyn Fn(usize, &super::Match) -> String| {
@@ -87,7 +93,8 @@ fn write_run(
     }
     if let Some(truth) = truth {
         let right = |(query, matches): (usize, &Vec<super::Match>)| {
-            let flag = |it: &super::Match| if truth.is_correct(query, it.reference) { '1' } else { '0' };
+            let flag =
+                |it: &super::Match| if truth.is_correct(query, it.reference) { '1' } else { '0' };
             format!("\"{}\"", matches.iter().take(SHOWN).map(flag).collect::<String>())
         };
         write!(out, ",\"ok\":{}", json::list(run.matches.iter().enumerate().map(right)))?;

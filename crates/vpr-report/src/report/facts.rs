@@ -16,8 +16,11 @@ pub(super) fn write(out: &mut dyn Write, report: &Report<'_>) -> io::Result<()> 
             (dataset.thumbnails.is_none(), "pictures"),
         ];
         let missing: Vec<&str> = missing.iter().filter(|it| it.0).map(|it| it.1).collect();
-        let without =
-            if missing.is_empty() { String::new() } else { format!("; without {}", missing.join(", ")) };
+        let without = if missing.is_empty() {
+            String::new()
+        } else {
+            format!("; without {}", missing.join(", "))
+        };
         let (n_queries, n_references) = (dataset.queries.len(), dataset.references.len());
         writeln!(
             out,

@@ -35,7 +35,10 @@ pub(super) fn write(
             card(out, report, (index, judged), query, pictures)?;
         }
     }
-    writeln!(out, "</div>\n<p class=\"script\"><button type=\"button\" id=\"more\" hidden>more</button></p>\n</section>")
+    writeln!(
+        out,
+        "</div>\n<p class=\"script\"><button type=\"button\" id=\"more\" hidden>more</button></p>\n</section>"
+    )
 }
 
 fn card(
@@ -53,7 +56,8 @@ fn card(
         Some(false) => "✗ wrong",
         None => "not judged",
     };
-    let (verdict, sign) = if judged.accepts(query) { ("accepted", "≤") } else { ("rejected", "&gt;") };
+    let (verdict, sign) =
+        if judged.accepts(query) { ("accepted", "≤") } else { ("rejected", "&gt;") };
     let uncertainty = judged.uncertainty[query];
     let reason = if uncertainty.is_finite() {
         format!("{} {sign} {}", short(uncertainty), short(judged.threshold))
@@ -66,7 +70,13 @@ fn card(
         escape(&clipped(&run.name)),
         escape(&label(run, judged)),
     )?;
-    picture(out, pictures, (of, Side::Query, query), &dataset.queries[query], ("query", "the query"))?;
+    picture(
+        out,
+        pictures,
+        (of, Side::Query, query),
+        &dataset.queries[query],
+        ("query", "the query"),
+    )?;
     let is_correct = |it: usize| truth.map(|truth| truth.is_correct(query, it));
     for it in run.matches[query].iter().take(SHOWN) {
         let (class, sign) = match is_correct(it.reference) {
@@ -115,9 +125,17 @@ fn picture(
 /// The end of a name, where images differ.
 fn tail(name: &str) -> String {
     let n = name.chars().count();
-    if n <= 24 { name.to_owned() } else { format!("…{}", name.chars().skip(n - 23).collect::<String>()) }
+    if n <= 24 {
+        name.to_owned()
+    } else {
+        format!("…{}", name.chars().skip(n - 23).collect::<String>())
+    }
 }
 
 fn clipped(text: &str) -> String {
-    if text.chars().count() <= 80 { text.to_owned() } else { text.chars().take(79).chain(['…']).collect() }
+    if text.chars().count() <= 80 {
+        text.to_owned()
+    } else {
+        text.chars().take(79).chain(['…']).collect()
+    }
 }

@@ -33,7 +33,13 @@ pub(super) fn rough(value: f64) -> String {
     if value != 0.0 && !(1e-2..1e9).contains(&value.abs()) {
         return format!("{value:.4e}");
     }
-    let decimals = if value.abs() < 1.0 { 5 } else if value.abs() < 1000.0 { 3 } else { 2 };
+    let decimals = if value.abs() < 1.0 {
+        5
+    } else if value.abs() < 1000.0 {
+        3
+    } else {
+        2
+    };
     let text = format!("{value:.decimals$}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }

@@ -159,7 +159,8 @@ fn write_path(
 }
 
 fn spoken(judged: &Judged) -> String {
-    let count = |kind: Kind| (0..judged.uncertainty.len()).filter(|&it| kind.holds(judged, it)).count();
+    let count =
+        |kind: Kind| (0..judged.uncertainty.len()).filter(|&it| kind.holds(judged, it)).count();
     let [wrong_rejected, right_rejected, right_accepted, wrong_accepted] = KINDS.map(count);
     if judged.correct.is_none() {
         return format!("{right_accepted} queries accepted, {right_rejected} rejected");

@@ -66,7 +66,8 @@ fn pooled(similarities: &Similarities) -> (usize, usize, Vec<u8>) {
         highest[square] = highest[square].max(*value);
     }
     let finite = || highest.iter().copied().filter(|it| it.is_finite());
-    let (low, high) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
+    let (low, high) =
+        (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
     let level = |value: &f64| {
         let share = if high > low { (value - low) / (high - low) } else { 0.5 };
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 255")]

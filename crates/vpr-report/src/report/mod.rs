@@ -177,9 +177,11 @@ const FILTERS: &str = include_str!("filters.html");
 /// Everything before the content; colours in light and dark.
 fn head(out: &mut dyn Write, title: &str) -> io::Result<()> {
     let variables = |colours: [&str; 8]| -> String {
-        colours.iter().enumerate().map(|(index, colour)| format!("--c{index}:{colour};")).collect()
+        let all = colours.iter().enumerate();
+        all.map(|(index, colour)| format!("--c{index}:{colour};")).collect::<Vec<_>>().concat()
     };
-    let classes: String = (0..8).map(|it| format!(".c{it}{{color:var(--c{it})}}")).collect();
+    let classes = (0..8).map(|it| format!(".c{it}{{color:var(--c{it})}}"));
+    let classes = classes.collect::<Vec<_>>().concat();
     write!(
         out,
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\

@@ -30,7 +30,8 @@ impl Judged {
             None => run.matches.iter().map(best).collect(),
         };
         let correct = truth.map(|truth| judge(run, truth));
-        let mut finite: Vec<f64> = uncertainty.iter().copied().filter(|it| it.is_finite()).collect();
+        let mut finite: Vec<f64> =
+            uncertainty.iter().copied().filter(|it| it.is_finite()).collect();
         finite.sort_unstable_by(f64::total_cmp);
         let median = finite.get(finite.len().saturating_sub(1) / 2).copied().unwrap_or(0.0);
         let n_unknown = uncertainty.len() - finite.len();

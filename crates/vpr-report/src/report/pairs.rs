@@ -26,7 +26,9 @@ pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged])
          <th scope=\"col\">chance of so uneven a split</th></tr></thead>\n<tbody>"
     )?;
     for (a, b) in pairs {
-        let (Some(first), Some(second)) = (&judged[a].correct, &judged[b].correct) else { continue };
+        let (Some(first), Some(second)) = (&judged[a].correct, &judged[b].correct) else {
+            continue;
+        };
         let count = |wanted: (bool, bool)| {
             first.iter().zip(second).filter(|it| (*it.0, *it.1) == wanted).count()
         };

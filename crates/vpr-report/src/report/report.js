@@ -7,7 +7,7 @@
   document.documentElement.classList.add("js");
   const PAGE = 24;
   // The plot of a chart and the margin of a map, as the file has them.
-  const PLOT = { left: 44, top: 10, width: 284, height: 196 }, MARGIN = 10;
+  const PLOT = { left: 56, top: 10, width: 272, height: 196 }, MARGIN = 10;
   const runs = data.runs, state = { run: 0, only: null, shown: PAGE, found: [] };
   const short = (v) => {
     if (v === null || Number.isNaN(v)) return "not a number";
@@ -201,8 +201,11 @@
   const update = () => {
     const run = runs[state.run], found = filtered();
     const has = (q) => here.has("q" + run.d + "-" + q) ? 0 : 1;
-    const key = (q) => run.u[q] === null ? Infinity : run.u[q];
-    state.found = found.slice().sort((a, b) => has(a) - has(b) || key(a) - key(b) || a - b);
+    // The most certain of the wrong first, then the least certain of the right.
+    const kind = (q) => isRight(run, q) ? (accepts(run, q) ? 3 : 1) : (accepts(run, q) ? 0 : 2);
+    const key = (q) => (run.u[q] === null ? 1e300 : run.u[q]) * (isRight(run, q) ? -1 : 1);
+    state.found = found.map((q) => [has(q), kind(q), key(q), q])
+      .sort((a, b) => a[0] - b[0] || a[1] - b[1] || a[2] - b[2] || a[3] - b[3]).map((it) => it[3]);
     state.shown = PAGE;
     const right = run.right ? ", " + found.filter((q) => run.right[q]).length + " of them right" : "";
     const accepted = found.filter((q) => accepts(run, q)).length;

@@ -15,7 +15,10 @@ const RANKS: [usize; 4] = [1, 5, 10, 20];
 const RESAMPLES: usize = 500;
 
 pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged]) -> io::Result<()> {
-    writeln!(out, "<section id=\"summary\">\n<h2>Numbers</h2>\n<div class=\"wide\">\n<table>\n<thead><tr><th scope=\"col\">run</th>")?;
+    writeln!(
+        out,
+        "<section id=\"summary\">\n<h2>Numbers</h2>\n<div class=\"wide\">\n<table>\n<thead><tr><th scope=\"col\">run</th>"
+    )?;
     let deepest = report.runs.iter().map(depth).max().unwrap_or(0);
     let ranks: Vec<usize> = RANKS.into_iter().filter(|it| *it <= deepest.max(1)).collect();
     for rank in &ranks {
@@ -28,7 +31,11 @@ pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged])
     )?;
     for (index, (run, judged)) in report.runs.iter().zip(judged).enumerate() {
         let (class, mark) = (style(report, index).colour, sample(style(report, index)));
-        write!(out, "<tr><th scope=\"row\" class=\"run\"><span class=\"c{class}\">{mark}</span> {}</th>", escape(&title(report, run)))?;
+        write!(
+            out,
+            "<tr><th scope=\"row\" class=\"run\"><span class=\"c{class}\">{mark}</span> {}</th>",
+            escape(&title(report, run))
+        )?;
         for rank in &ranks {
             let cell = recall(report, run, *rank).map_or("–".to_owned(), |it| interval(&it));
             write!(out, "<td>{cell}</td>")?;
@@ -40,7 +47,10 @@ pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged])
         let accepted: Vec<usize> = (0..n).filter(|&query| judged.accepts(query)).collect();
         let share = wilson_interval(accepted.len(), n, Z_95).ok();
         write!(out, "<td>{}</td>", share.map_or("–".to_owned(), |it| interval(&it)))?;
-        let right = judged.correct.as_ref().map(|correct| accepted.iter().filter(|&&it| correct[it]).count());
+        let right = judged
+            .correct
+            .as_ref()
+            .map(|correct| accepted.iter().filter(|&&it| correct[it]).count());
         let share = right.and_then(|right| wilson_interval(right, accepted.len(), Z_95).ok());
         writeln!(out, "<td>{}</td></tr>", share.map_or("–".to_owned(), |it| interval(&it)))?;
     }

@@ -49,7 +49,9 @@ pub(super) fn by_interest(judged: &Judged) -> Vec<usize> {
     kinds[0].sort_by(by);
     kinds[1].sort_by(|a, b| by(b, a));
     let longest = kinds.iter().map(Vec::len).max().unwrap_or(0);
-    (0..longest).flat_map(|rank| kinds.iter().filter_map(move |kind| kind.get(rank).copied())).collect()
+    (0..longest)
+        .flat_map(|rank| kinds.iter().filter_map(move |kind| kind.get(rank).copied()))
+        .collect()
 }
 
 /// All pictures that cards may show, most wanted first.
@@ -130,5 +132,9 @@ pub(super) fn write(
 
 fn style(picture: Picture, file: &[u8]) -> String {
     let kind = if file.starts_with(b"\x89PNG") { "png" } else { "jpeg" };
-    format!(".{}{{background-image:url(data:image/{kind};base64,{})}}\n", class(picture), png::base64(file))
+    format!(
+        ".{}{{background-image:url(data:image/{kind};base64,{})}}\n",
+        class(picture),
+        png::base64(file)
+    )
 }

@@ -82,7 +82,8 @@ impl Notes {
         if let Some(note) = &self.everywhere {
             return format!("All: {note}\n");
         }
-        (1..).zip(&self.texts).map(|(number, note)| format!("[{number}] {note}\n")).collect()
+        let lines = (1..).zip(&self.texts).map(|(number, note)| format!("[{number}] {note}\n"));
+        lines.collect::<Vec<_>>().concat()
     }
 }
 
@@ -168,7 +169,8 @@ mod tests {
     #[test]
     fn many_notes_that_differ_in_numbers_become_one() {
         let cell = |row: usize| cell(&row.to_string(), "x", &format!("base rate 0.{row}2; own"));
-        let cells: Vec<Cell> = (0..4).map(cell).collect();
+        let mut cells: Vec<Cell> = (0..4).map(cell).collect();
+        cells.push(Cell::new("0", "y", 0.5, Provenance::Measured, 9));
         let notes = notes(&cells);
         assert_eq!(notes.text(), "[1] base rate …; own (numbers: see the CSV)\n");
         assert_eq!(notes.mark_of_column("x"), " [1]");

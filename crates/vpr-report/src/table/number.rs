@@ -2,6 +2,9 @@
 
 use super::{Interval, Value};
 
+/// Share by which the two sides of an interval may differ and still be one number.
+const ALIKE: f64 = 0.25;
+
 /// A value with its interval, if it has one: `.865 ± .03`, `.865 (.81–.89)` where the two sides
 /// differ.
 pub(super) fn with_interval(value: &Value, interval: Option<&Interval>) -> String {
@@ -15,8 +18,7 @@ pub(super) fn with_interval(value: &Value, interval: Option<&Interval>) -> Strin
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 4")]
     let decimals = (-half.log10().floor()).clamp(0.0, 4.0) as usize;
     let shown = fixed(*value, decimals + 1);
-    let unit = 10_f64.powi(-i32::try_from(decimals).unwrap_or(4));
-    if (below - above).abs() < unit {
+    if (below - above).abs() <= ALIKE * half {
         return format!("{shown} ± {}", fixed(half, decimals));
     }
     let (low, high) = (fixed(interval.low, decimals), fixed(interval.high, decimals));

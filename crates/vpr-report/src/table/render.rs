@@ -1,5 +1,7 @@
 //! A table as text, CSV, JSON or Markdown.
 
+use std::fmt::Write as _;
+
 use comfy_table::{Table as Grid, TableStyle, presets};
 use serde::{Deserialize, Serialize};
 
@@ -71,11 +73,11 @@ fn blocks(blocks: &[Block], style: TableStyle, heading: &str) -> String {
         }
         if let Some(row) = &block.heading {
             let after = if heading.is_empty() { "" } else { "\n" };
-            text += &format!("{heading}{}\n{after}", safe(row));
+            let _ = write!(text, "{heading}{}\n{after}", safe(row));
         }
         let mut grid = Grid::new();
         let lines = block.lines.iter().map(|line| line.iter().map(safe).collect::<Vec<_>>());
-        grid.load_style(style.clone());
+        grid.load_style(style);
         grid.set_header(block.header.iter().map(safe).collect::<Vec<_>>()).add_rows(lines);
         for line in grid.lines() {
             text += line.trim_end();

@@ -49,13 +49,8 @@ fn tables() -> [Table; 3] {
                 let value = 0.4 + 0.047 * index as f64 - 0.1 * f64::from(line);
                 let cell = |definition| {
                     let row = format!("{row} {line}");
-                    let cell = Cell::new(
-                        row,
-                        format!("technique {index}"),
-                        value,
-                        Provenance::Measured,
-                        9,
-                    );
+                    let cell =
+                        Cell::new(row, format!("tech {index}"), value, Provenance::Measured, 9);
                     let mut cell = cell.defined(definition);
                     cell.thesis = Some(Value::Number((value * 100.0).floor() / 100.0));
                     if index % 3 == 0 { cell.noted(format!("note {index}")) } else { cell }
@@ -70,7 +65,7 @@ fn tables() -> [Table; 3] {
     };
     [
         table(2, "street"),
-        table(16, "street"),
+        table(16, "s"),
         table(16, "7-Scenes RedKitchen / a long encoder's name"),
     ]
 }
