@@ -57,11 +57,16 @@ pub(crate) fn escape(text: &str) -> String {
             '"' => escaped.push_str("&quot;"),
             '\'' => escaped.push_str("&#39;"),
             // Neither XML nor a reader can do anything with these.
-            it if it.is_control() => escaped.push('\u{fffd}'),
+            it if it.is_control() || is_turning(it) => escaped.push('\u{fffd}'),
             it => escaped.push(it),
         }
     }
     escaped
+}
+
+/// Whether a character turns the direction of the text after it, also beyond its own name.
+fn is_turning(it: char) -> bool {
+    matches!(it, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 #[cfg(test)]
@@ -82,6 +87,7 @@ mod tests {
 
     #[test]
     fn nothing_escapes() {
+        assert_eq!(escape("a\u{202e}b"), "a\u{fffd}b");
         assert_eq!(escape("<b a=\"'\">&\u{1}"), "&lt;b a=&quot;&#39;&quot;&gt;&amp;\u{fffd}");
     }
 }

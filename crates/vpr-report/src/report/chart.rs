@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use super::{escape, short};
+use super::{clipped, escape, short};
 use crate::figure::{Mark, Style};
 
 /// The picture and the plot inside of it, in its own units; the script knows them too.
@@ -111,7 +111,7 @@ impl Chart<'_> {
              <text class=\"mid\" transform=\"rotate(-90 12 {y})\" x=\"12\" y=\"{y}\">{}</text>",
             left + plot_width / 2.0,
             SIZE.1 - 8.0,
-            escape(self.x_label),
+            escape(&clipped(self.x_label, 44)),
             escape(self.y_label),
             y = top + plot_height / 2.0,
         )?;

@@ -31,7 +31,7 @@ pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged])
     let names: Vec<String> = report.runs.iter().map(|run| title(report, run)).collect();
     writeln!(
         out,
-        "<section id=\"curves\">\n<h2>Curves</h2>\n<p class=\"notes script\">The black line is the run chosen above on what the filters leave. Values under the pointer stand below each plot.</p>\n<div class=\"charts\">"
+        "<section id=\"curves\">\n<h2>Curves</h2>\n<p class=\"notes script\">The dashed line is the run chosen above on what the filters leave. Values under the pointer stand below each plot.</p>\n<div class=\"charts\">"
     )?;
     let line = |run: usize, points: Vec<(f64, f64)>| Line {
         name: names[run].clone(),

@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 
 use super::{
-    Judged, Report, Side,
+    Judged, Report, Side, clipped,
     data::SHOWN,
     escape,
     outcome::label,
@@ -67,7 +67,7 @@ fn card(
     writeln!(
         out,
         "<article class=\"card\"><h3>{}: <b>{mark}</b>, {verdict}</h3><p>{}: {reason}</p>\n<div class=\"row\">",
-        escape(&clipped(&run.name)),
+        escape(&clipped(&run.name, 80)),
         escape(&label(run, judged)),
     )?;
     picture(
@@ -108,7 +108,7 @@ fn picture(
 ) -> io::Result<()> {
     let text = match pictures.unreadable.get(&which) {
         _ if pictures.here.contains(&which) => String::new(),
-        Some(reason) => format!("<i>cannot be read: {}</i>", escape(&clipped(reason))),
+        Some(reason) => format!("<i>cannot be read: {}</i>", escape(&clipped(reason, 80))),
         None => "<i>no picture here</i>".to_owned(),
     };
     let label = escape(name);
@@ -129,13 +129,5 @@ fn tail(name: &str) -> String {
         name.to_owned()
     } else {
         format!("…{}", name.chars().skip(n - 23).collect::<String>())
-    }
-}
-
-fn clipped(text: &str) -> String {
-    if text.chars().count() <= 80 {
-        text.to_owned()
-    } else {
-        text.chars().take(79).chain(['…']).collect()
     }
 }

@@ -227,3 +227,11 @@ fn short(value: f64) -> String {
         _ => format!("{value:.1e}"),
     }
 }
+
+/// At most `n` letters of a text.
+fn clipped(text: &str, n: usize) -> String {
+    if text.chars().count() <= n {
+        return text.to_owned();
+    }
+    text.chars().take(n.saturating_sub(1)).chain(['…']).collect()
+}

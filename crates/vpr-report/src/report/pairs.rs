@@ -20,7 +20,7 @@ pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged])
     }
     writeln!(
         out,
-        "<section id=\"pairs\">\n<h2>Query by query</h2>\n<div class=\"wide\">\n<table>\n<thead><tr>\
+        "<section id=\"pairs\">\n<h2>Query by query</h2>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"wins and losses\">\n<table>\n<thead><tr>\
          <th scope=\"col\">first</th><th scope=\"col\">second</th><th scope=\"col\">both right</th>\
          <th scope=\"col\">only first</th><th scope=\"col\">only second</th><th scope=\"col\">both wrong</th>\
          <th scope=\"col\">chance of so uneven a split</th></tr></thead>\n<tbody>"

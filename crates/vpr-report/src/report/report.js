@@ -22,6 +22,10 @@
     return it;
   };
 
+  // Nothing turns the direction of the text around it.
+  const plain = (text) => text.replace(/[\u202a-\u202e\u2066-\u2069]/g, "\ufffd");
+  for (const run of runs) [run.name, run.by] = [plain(run.name), plain(run.by)];
+
   // Verdicts, per run.
   for (const run of runs) {
     run.right = run.ok ? run.ok.map((flags) => flags[0] === "1") : null;
@@ -160,12 +164,12 @@
 
   // The gallery.
   const picture = (kind, set, side, i, caption) => {
-    const dataset = data.datasets[set], name = dataset[side + "0"] + dataset[side][i];
+    const dataset = data.datasets[set], name = plain(dataset[side + "0"] + dataset[side][i]);
     const id = side + set + "-" + i, figure = element("figure", undefined, kind);
     const image = element("div", undefined, "im " + id);
     image.setAttribute("role", "img");
     image.setAttribute("aria-label", name);
-    if (!here.has(id)) image.append(element("i", id in pictures.bad ? "cannot be read: " + pictures.bad[id] : "no picture here"));
+    if (!here.has(id)) image.append(element("i", id in pictures.bad ? "cannot be read: " + plain(pictures.bad[id]) : "no picture here"));
     const text = element("figcaption", caption), small = element("small"), letters = [...name];
     small.title = name;
     small.append(element("bdi", letters.length > 24 ? "…" + letters.slice(-23).join("") : name));

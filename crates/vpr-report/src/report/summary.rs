@@ -17,7 +17,7 @@ const RESAMPLES: usize = 500;
 pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged]) -> io::Result<()> {
     writeln!(
         out,
-        "<section id=\"summary\">\n<h2>Numbers</h2>\n<div class=\"wide\">\n<table>\n<thead><tr><th scope=\"col\">run</th>"
+        "<section id=\"summary\">\n<h2>Numbers</h2>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"numbers of every run\">\n<table>\n<thead><tr><th scope=\"col\">run</th>"
     )?;
     let deepest = report.runs.iter().map(depth).max().unwrap_or(0);
     let ranks: Vec<usize> = RANKS.into_iter().filter(|it| *it <= deepest.max(1)).collect();

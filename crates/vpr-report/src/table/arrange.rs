@@ -7,7 +7,7 @@ use vpr_core::Provenance;
 const BETWEEN: usize = 3;
 /// Fewest columns beside the labels for which a table is cut into parts; with fewer, every row
 /// becomes a block of its own.
-const WORTH: usize = 4;
+const WORTH: usize = 3;
 
 /// Lines under a header.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

@@ -63,11 +63,7 @@ fn tables() -> [Table; 3] {
         table.push(Cell::new(format!("{row} 1"), "a word", "falls", Provenance::Measured, 9));
         table
     };
-    [
-        table(2, "street"),
-        table(16, "s"),
-        table(16, "7-Scenes RedKitchen / a long encoder's name"),
-    ]
+    [table(2, "street"), table(16, "s"), table(16, "7-Scenes RedKitchen / a long encoder's name")]
 }
 
 /// The printed entries of a Markdown text by row, line label and column.
