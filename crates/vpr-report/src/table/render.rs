@@ -35,13 +35,16 @@ pub(super) fn render(table: &Table, format: Format, width: usize) -> String {
         Format::Table => {
             let pivot = Pivot::new(table, |text| text + " *");
             let blocks = blocks(&pivot.blocks(width), presets::NOTHING, "");
-            let notes = notes(&pivot, "*: ");
+            let notes = wrapped(&notes(&pivot, "*: "), width);
             format!("{}: {}\n{blocks}{notes}", table.id, table.title)
         }
         Format::Markdown => {
             let pivot = Pivot::new(table, |text| format!("**{text}**"));
             let blocks = blocks(&pivot.blocks(width), presets::ASCII_MARKDOWN, "### ");
-            format!("{blocks}\n{}", notes(&pivot, "Bold: "))
+            let notes = notes(&pivot, "Bold: ").replace("\n[", "\n- [");
+            // Notes are items of a list, or they would run together.
+            let item = if notes.starts_with('[') { "- " } else { "" };
+            format!("{blocks}\n{item}{notes}")
         }
         Format::Csv => csv(table.cells.iter()),
         Format::Json => {
@@ -87,11 +90,33 @@ fn blocks(blocks: &[Block], style: TableStyle, heading: &str) -> String {
     text
 }
 
+/// Lines broken between words, so that none is longer than the page.
+fn wrapped(text: &str, width: usize) -> String {
+    let mut wrapped = String::new();
+    for line in text.lines() {
+        let mut length = 0;
+        for word in line.split(' ') {
+            let n = word.chars().count();
+            if length > 0 && length + 1 + n > width {
+                wrapped.push_str("\n    ");
+                length = 4;
+            } else if length > 0 {
+                wrapped.push(' ');
+                length += 1;
+            }
+            wrapped.push_str(word);
+            length += n;
+        }
+        wrapped.push('\n');
+    }
+    wrapped
+}
+
 /// What the marks mean.
 fn notes(pivot: &Pivot<'_>, best: &str) -> String {
     let best = if pivot.has_best {
         format!(
-            "{best}the best of its line, its 95 % interval above all others'; intervals that \
+            "{best}the best of its row, its 95 % interval above all others'; intervals that \
              overlap may still differ.\n"
         )
     } else {
@@ -147,7 +172,7 @@ mod tests {
         table.highest_is_best = true;
         let text = table.render(Format::Markdown);
         assert!(text.contains("**.750 ± .05**") && text.matches("**").count() == 2, "{text}");
-        assert!(text.contains("Bold: the best of its line"), "{text}");
+        assert!(text.contains("Bold: the best of its row"), "{text}");
         assert!(table.render(Format::Table).contains(".750 ± .05 *"));
     }
 
