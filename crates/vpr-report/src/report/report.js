@@ -235,19 +235,21 @@
       }
       update();
     });
+    const choose = (preset) => {
+      state.only = null;
+      control("right").value = preset ? (preset[0] === "r" ? "1" : "0") : "";
+      control("accept").value = preset ? (preset[1] === "a" ? "1" : "0") : "";
+      for (const id of ["low", "high", "other"]) control(id).value = "";
+      update();
+    };
     for (const button of document.querySelectorAll("[data-preset]")) {
-      button.addEventListener("click", () => {
-        const preset = button.dataset.preset;
-        state.only = null;
-        control("right").value = preset ? (preset[0] === "r" ? "1" : "0") : "";
-        control("accept").value = preset ? (preset[1] === "a" ? "1" : "0") : "";
-        for (const id of ["low", "high", "other"]) control(id).value = "";
-        update();
-      });
+      button.addEventListener("click", () => choose(button.dataset.preset));
     }
     fillOthers();
     showCover();
-    update();
+    // `report.html#wa` opens with the wrong and accepted ones, and so on.
+    const asked = location.hash.slice(1);
+    choose(["wa", "wr", "ra", "rr"].includes(asked) ? asked : "");
   }
 
   // Values under the pointer.
