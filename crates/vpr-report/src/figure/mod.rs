@@ -4,6 +4,7 @@
 //! colour, more become several panels in which the others are grey. Names stand beside the curves'
 //! ends or in one legend above the panels, never over them.
 
+mod apart;
 mod axis;
 mod draw;
 mod multiples;
