@@ -55,12 +55,11 @@ const CHAPTER: &[&str] = &[
 ];
 
 /// Packages that only some may name.
-const RESERVED: [(&str, &[&str]); 5] = [
+const RESERVED: [(&str, &[&str]); 4] = [
     ("burn", &["vpr-nets", "vpr-sue"]),
     ("kornia-image", &["vpr-vision"]),
     ("kornia-imgproc", &["vpr-vision"]),
     ("hdf5-pure", &["vpr-data"]),
-    ("plotters", &["vpr-report"]),
 ];
 
 /// The most dependencies that xtask may have: every command waits for it.

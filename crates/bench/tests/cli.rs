@@ -162,6 +162,40 @@ fn folders_with_positions_give_the_result_line() {
     assert_eq!(stdout(&output).trim_end(), "R@1: 66.7, R@5: 66.7");
 }
 
+#[test]
+fn a_report_is_written_beside_the_result_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let report = dir.path().join("out.html");
+    let output = run(&[
+        "evaluate",
+        "--database-folder",
+        "data/fixture/utm/database",
+        "--queries-folder",
+        "data/fixture/utm/queries",
+        "--report",
+        report.to_str().unwrap(),
+    ]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    assert!(stdout(&output).starts_with("R@1: 66.7"), "{}", stdout(&output));
+    let html = fs::read_to_string(&report).unwrap();
+    // Provenance, a number of the result line, a map and pictures.
+    for part in ["--report", "within 25 m", "<td>0.667 <small>", "id=\"map\"", "data:image/jpeg"] {
+        assert!(html.contains(part), "{part}");
+    }
+    let missing = dir.path().join("nowhere").join("out.html");
+    let output = run(&[
+        "evaluate",
+        "--database-folder",
+        "data/fixture/utm/database",
+        "--queries-folder",
+        "data/fixture/utm/queries",
+        "--report",
+        missing.to_str().unwrap(),
+    ]);
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(stderr(&output).contains("nowhere"), "{}", stderr(&output));
+}
+
 /// A folder with two descriptor files and their poses.
 fn descriptors() -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();

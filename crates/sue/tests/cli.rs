@@ -221,6 +221,18 @@ fn evaluation_prints_metrics_intervals_and_differences() {
 }
 
 #[test]
+fn a_report_has_a_run_per_estimator() {
+    let world = World::new();
+    let more = ["--lambda", "5", "--resamples", "50", "--report", "out.html"];
+    success(&world.with("evaluate", &more));
+    let html = std::fs::read_to_string(world.path("out.html")).unwrap();
+    for part in ["SUE", "L2-distance", "PA-Score", "sue evaluate", "id=\"curves\""] {
+        assert!(html.contains(part), "{part}");
+    }
+    assert!(!html.contains("id=\"pairs\""), "the matches are the same for all");
+}
+
+#[test]
 fn calibration_says_what_it_promises() {
     let world = World::new();
     let words = success(&world.with("calibrate", &["--estimator", "l2"]));

@@ -2,7 +2,7 @@
 #![expect(clippy::print_stderr, reason = "the one place that prints")]
 
 use std::{
-    io::{ErrorKind, IsTerminal, Write},
+    io::{BufWriter, ErrorKind, IsTerminal, Write},
     path::{Path, PathBuf},
     process::ExitCode,
     sync::Mutex,
@@ -16,9 +16,11 @@ use serde::de::DeserializeOwned;
 use crate::{
     experiment::{self, Experiment},
     page::Report,
-    table::{Checked, Format},
+    report,
+    table::{Checked, Format, WIDTH},
 };
 use vpr_core::Observer;
+use vpr_files::NewFile;
 
 /// What a command concluded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,6 +86,56 @@ pub struct RunArgs {
     /// How results are printed and kept.
     #[command(flatten)]
     pub output: OutputArgs,
+}
+
+/// A report to look at.
+#[derive(Args, Clone, Debug)]
+pub struct ReportArgs {
+    /// Also write a report to look at, one HTML file: curves, map, gallery, filters
+    #[arg(id = "report", long = "report", value_name = "HTML")]
+    pub path: Option<PathBuf>,
+    /// Keep all thumbnails of the report, however large it becomes; otherwise it has at most 10 MB
+    #[arg(long, requires = "report")]
+    pub full: bool,
+}
+
+impl ReportArgs {
+    /// Bytes that the report may take.
+    #[must_use]
+    pub fn budget(&self) -> Option<usize> {
+        (!self.full).then_some(report::BUDGET)
+    }
+
+    /// Writes the report if one is asked for; the file appears whole or not at all.
+    ///
+    /// # Errors
+    ///
+    /// Runs that do not fit their dataset, or a folder that cannot be written.
+    pub fn write(&self, report: &report::Report<'_>) -> anyhow::Result<()> {
+        let Some(path) = &self.path else { return Ok(()) };
+        let mut file = NewFile::create(path)?;
+        let failed = file.io_error();
+        let mut out = BufWriter::new(file.file());
+        let written = report.write(&mut out).and_then(|()| out.flush());
+        drop(out);
+        written.map_err(failed)?;
+        Ok(file.commit()?)
+    }
+}
+
+/// The command line as it was typed, quoted where a shell would need it.
+#[must_use]
+pub fn command_line() -> String {
+    let program =
+        |it: String| Path::new(&it).file_name().map(|it| it.to_string_lossy().into_owned());
+    let is_plain = |it: char| it.is_ascii_alphanumeric() || "-_./=:,@+%".contains(it);
+    let quoted = |it: String| match it.chars().all(is_plain) && !it.is_empty() {
+        true => it,
+        false => format!("'{}'", it.replace('\'', "'\\''")),
+    };
+    let mut words = std::env::args_os().map(|it| it.to_string_lossy().into_owned());
+    let program = words.next().and_then(program);
+    program.into_iter().chain(words.map(quoted)).collect::<Vec<_>>().join(" ")
 }
 
 impl RunArgs {
@@ -191,6 +243,13 @@ impl Observer for Bar {
     }
 }
 
+/// Letters of a line: `COLUMNS`, or what pages have.
+#[must_use]
+pub fn columns() -> usize {
+    let columns = std::env::var("COLUMNS").ok().and_then(|it| it.parse().ok());
+    columns.filter(|columns| *columns > 0).unwrap_or(WIDTH)
+}
+
 /// Prints a result and, as the flags say, writes its page or checks it.
 ///
 /// # Errors
@@ -202,7 +261,7 @@ pub fn finish<S>(
     output: &OutputArgs,
 ) -> anyhow::Result<Outcome> {
     let table = &report.table;
-    print(&table.render(output.format))?;
+    print(&table.render_within(output.format, columns()))?;
     if let Some(folder) = &output.write {
         report.write(experiment, folder)?;
     }

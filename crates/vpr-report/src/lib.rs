@@ -16,7 +16,9 @@
 pub mod cli;
 pub mod experiment;
 pub mod figure;
+pub mod index;
 pub mod page;
+pub mod report;
 pub mod table;
 
 /// The examples of the README, as tests.

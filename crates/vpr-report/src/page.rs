@@ -8,6 +8,7 @@ use vpr_files::replace;
 use crate::{
     experiment::Experiment,
     figure::Figure,
+    index,
     table::{Cell, Checked, Drawings, Finding, Table, check, csv_page, markdown_page, read_csv},
 };
 
@@ -41,18 +42,21 @@ impl Report {
         Self { table, figure, sheet: None }
     }
 
+    fn svg(&self, figure: &Figure) -> String {
+        figure.svg(&format!("{}: {}", self.table.id, self.table.title))
+    }
+
     fn drawings(&self) -> Drawings<'_> {
         let sheet = self.sheet.as_ref().map(|sheet| sheet.legend);
         Drawings { figure: self.figure.is_some(), sheet }
     }
 
-    /// Writes the page, its CSV and its drawings into a folder; each file appears whole or not at
-    /// all.
+    /// Writes the page, its CSV and its drawings into a folder, and lists it there; each file
+    /// appears whole or not at all.
     ///
     /// # Errors
     ///
-    /// [`Error::Io`] if the folder cannot be written; [`Error::Format`] if the figure cannot be
-    /// drawn.
+    /// [`Error::Io`] if the folder cannot be written.
     pub fn write<S>(&self, experiment: &Experiment<S>, folder: &Path) -> Result<()> {
         fs::create_dir_all(folder).map_err(Error::io(folder))?;
         let path = |extension: &str| folder.join(format!("{}.{extension}", self.table.id));
@@ -61,12 +65,12 @@ impl Report {
         let text = markdown_page(&self.table, &experiment.source, self.drawings());
         replace(&path("md"), text.as_bytes())?;
         if let Some(figure) = &self.figure {
-            replace(&path("svg"), svg(figure, &path("svg"))?.as_bytes())?;
+            replace(&path("svg"), self.svg(figure).as_bytes())?;
         }
         if let Some(sheet) = &self.sheet {
             replace(&path("png"), &sheet.png)?;
         }
-        Ok(())
+        Ok(replace(&folder.join(index::FILE), index::index(folder)?.as_bytes())?)
     }
 
     /// Compares with the committed files in a folder and with the expected numbers.
@@ -86,11 +90,21 @@ impl Report {
         };
         let mut checked = check(&self.table, &committed, &experiment.expect);
         self.check_markdown(&mut checked, experiment, committed, &path("md"))?;
+        let list = folder.join(index::FILE);
+        match present(&list, read_text)? {
+            None => checked.findings.push(missing(&list)),
+            // A page that is missing was found above.
+            Some(_) if !path("md").exists() => {}
+            Some(text) if text.contains(&index::line(folder, &self.table.id)?) => {
+                checked.n_compared += 1;
+            }
+            Some(_) => checked.findings.push(stale(&list)),
+        }
         if checked.n_not_at_hand > 0 {
             return Ok(checked);
         }
         if let Some(figure) = &self.figure {
-            let drawn = svg(figure, &path("svg"))?;
+            let drawn = self.svg(figure);
             match present(&path("svg"), read_text)? {
                 None => checked.findings.push(missing(&path("svg"))),
                 Some(page) if is_same_drawing(&page, &drawn) => checked.n_compared += 1,
@@ -132,10 +146,6 @@ impl Report {
         }
         Ok(())
     }
-}
-
-fn svg(figure: &Figure, path: &Path) -> Result<String> {
-    figure.svg().map_err(|reason| Error::format(path, "figure", reason))
 }
 
 fn missing(path: &Path) -> Finding {
@@ -191,8 +201,7 @@ mod tests {
     fn report(value: f64) -> Report {
         let mut table = Table::new("figure-0", "t");
         table.push(Cell::new("street", "HOG", value, Provenance::Generated, 9).noted("all"));
-        let points = vec![(0.0, 0.0), (1.0, value)];
-        let curves = vec![Curve { name: "HOG".into(), points }];
+        let curves = vec![Curve::new("HOG", vec![(0.0, 0.0), (1.0, value)])];
         let figure = Figure { panels: vec![Panel { curves, ..Panel::default() }] };
         let sheet = Sheet { png: vec![1, 2, 3], legend: "Grey: query." };
         Report { table, figure: Some(figure), sheet: Some(sheet) }
@@ -211,12 +220,16 @@ mod tests {
         assert!(findings(&report, folder.path())[0].contains("no committed page"));
         report.write(&Experiment::new("figure-0", "t", ()), folder.path()).unwrap();
         assert_eq!(findings(&report, folder.path()), [""; 0]);
-        for (extension, from, to) in [("md", "all", "some"), ("svg", "HOG", "H0G")] {
-            let path = folder.path().join(format!("figure-0.{extension}"));
+        for (file, from, to) in [
+            ("figure-0.md", "all", "some"),
+            ("figure-0.svg", "HOG", "H0G"),
+            ("index.md", "figure-0.md", "figure-1.md"),
+        ] {
+            let path = folder.path().join(file);
             let text = fs::read_to_string(&path).unwrap();
             fs::write(&path, text.replace(from, to)).unwrap();
             let found = findings(&report, folder.path());
-            assert!(found.len() == 1 && found[0].contains(extension), "{found:?}");
+            assert!(found.len() == 1 && found[0].contains(file), "{found:?}");
             fs::write(&path, text).unwrap();
         }
         fs::write(folder.path().join("figure-0.png"), [1, 2]).unwrap();

@@ -22,7 +22,7 @@ use vpr_core::{
     Descriptors,
     knn::{SearchParams, search},
 };
-use vpr_report::figure::{Curve, Figure, Panel};
+use vpr_report::figure::{Curve, Figure, Panel, Scale};
 
 /// Values per descriptor where something else varies.
 const DIM: usize = 128;
@@ -57,7 +57,7 @@ fn main() -> Result<()> {
         sweep.write_table(&mut page)?;
     }
     let panels = sweeps.iter().map(Sweep::panel).collect();
-    let svg = Figure { panels }.svg().map_err(anyhow::Error::msg)?;
+    let svg = Figure { panels }.svg("Time of exact search, Euclidean, k = 10");
     fs::create_dir_all(&folder)?;
     fs::write(Path::new(&folder).join("search-scaling.svg"), svg)?;
     fs::write(Path::new(&folder).join("search-scaling.md"), page)?;
@@ -158,18 +158,18 @@ impl Sweep {
     }
 
     fn panel(&self) -> Panel {
-        let curve = |column: usize| Curve {
-            name: self.times[column].to_owned(),
-            points: (self.rows.iter())
-                .map(|(value, times)| ((*value as f64).log10(), times[column].log10()))
-                .collect(),
+        let curve = |column: usize| {
+            let points = self.rows.iter().map(|(value, times)| (*value as f64, times[column]));
+            Curve::new(self.times[column], points.collect())
         };
         Panel {
             title: self.title.clone(),
-            x_label: format!("{}, log10", self.quantity),
-            y_label: "milliseconds, log10".to_owned(),
+            x_label: self.quantity.to_owned(),
+            y_label: "milliseconds".to_owned(),
             curves: (0..self.times.len()).map(curve).collect(),
-            is_scatter: false,
+            x_scale: Scale::Log,
+            y_scale: Scale::Log,
+            ..Panel::default()
         }
     }
 }

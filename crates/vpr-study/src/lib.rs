@@ -31,6 +31,7 @@ mod store;
 mod stored;
 mod subject;
 pub mod technique;
+mod thumbnail;
 pub mod verification;
 
 pub use describe::{Describe, Features, Matched};
@@ -40,12 +41,13 @@ pub use memo::Memo;
 #[cfg(feature = "networks")]
 pub use network::Network;
 pub use scored::{Direction, MAX_RANK, Scores};
-pub use sheet::{ContactSheet, Frame};
+pub use sheet::{ContactSheet, Frame, Tile};
 pub use sources::Sources;
 pub use store::Store;
 pub use stored::Stored;
 pub use subject::Subject;
 pub use technique::{Runner, Technique};
+pub use thumbnail::thumbnails;
 
 /// The examples of the README, as tests.
 #[cfg(doctest)]

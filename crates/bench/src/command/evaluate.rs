@@ -9,7 +9,7 @@ use vpr_core::{
 };
 use vpr_data::layout::vpr_bench::GroundTruthFile;
 use vpr_files::npy;
-use vpr_report::cli::{self, Bar, DataArgs, Outcome};
+use vpr_report::cli::{self, Bar, DataArgs, Outcome, ReportArgs};
 use vpr_study::{Runner, Sources, technique::hand_crafted};
 
 #[cfg(feature = "networks")]
@@ -20,6 +20,7 @@ use super::{
 use super::{
     named::Named,
     predictions::{self, Saving},
+    report,
     retrieved::{Retrieved, nearest},
 };
 
@@ -33,7 +34,7 @@ pub(crate) struct EvaluateArgs {
         value_name = "NAME",
         conflicts_with_all = ["database_folder", "database_descriptors", "ground_truth"]
     )]
-    dataset: Option<String>,
+    pub(super) dataset: Option<String>,
     /// Folder of the reference images, with `@utm_east@utm_north@…` names
     #[arg(long, alias = "database_folder", value_name = "DIR", requires = "queries_folder")]
     database_folder: Option<PathBuf>,
@@ -42,7 +43,7 @@ pub(crate) struct EvaluateArgs {
     queries_folder: Option<PathBuf>,
     /// Technique that describes the images: hog, hog-thesis, cohog, or a network of `bench methods`
     #[arg(long, default_value = "hog", value_name = "NAME")]
-    method: String,
+    pub(super) method: String,
     #[cfg(feature = "networks")]
     #[command(flatten)]
     encoder: EncoderArgs,
@@ -56,7 +57,7 @@ pub(crate) struct EvaluateArgs {
         requires = "queries_descriptors",
         conflicts_with = "database_folder"
     )]
-    database_descriptors: Option<PathBuf>,
+    pub(super) database_descriptors: Option<PathBuf>,
     /// Descriptors of the queries
     #[arg(
         long,
@@ -73,10 +74,10 @@ pub(crate) struct EvaluateArgs {
     queries_poses: Option<PathBuf>,
     /// Correct references per query, VPR-Bench's `ground_truth_new.npy`; instead of positions
     #[arg(long, alias = "ground_truth", value_name = "NPY", conflicts_with = "database_poses")]
-    ground_truth: Option<PathBuf>,
+    pub(super) ground_truth: Option<PathBuf>,
     /// A reference is correct within this many metres, the limit included
     #[arg(long, alias = "positive_dist_threshold", default_value_t = 25.0, value_name = "M")]
-    positive_dist_threshold: f64,
+    pub(super) positive_dist_threshold: f64,
     /// Which N of recall@N to print
     #[arg(long, alias = "recall_values", num_args = 1.., default_values_t = [1, 5, 10, 20], value_name = "N")]
     recall_values: Vec<usize>,
@@ -98,6 +99,8 @@ pub(crate) struct EvaluateArgs {
     /// Name of the folder below `logs/` where results are saved
     #[arg(long, alias = "log_dir", default_value = "default", value_name = "NAME")]
     log_dir: String,
+    #[command(flatten)]
+    pub(super) report: ReportArgs,
     /// Threads; all processors by default
     #[arg(long, alias = "num_workers", value_name = "N")]
     num_workers: Option<usize>,
@@ -130,6 +133,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         }
     }
     predictions::save(&args.saving(), &retrieved, truth.as_ref())?;
+    report::write(args, &retrieved, truth.as_ref())?;
     Ok(Outcome::Success)
 }
 
@@ -227,8 +231,13 @@ fn match_images(
     let matched = query_features.match_with(&reference_features)?;
     let ranking = matched.similarities.ranked(k)?;
     let descriptors = query_features.into_descriptors().zip(reference_features.into_descriptors());
-    let confidence = matched.similarities.best().confidence;
-    Ok(Retrieved::new([queries, references], ranking, confidence, descriptors))
+    let similarities = matched.similarities;
+    let confidence = similarities.best().confidence;
+    let scores = similarities.view();
+    let of = |query: usize| ranking.indices(query).iter().map(|&it| -scores[[query, it]]).collect();
+    let distances = (0..ranking.len()).map(of).collect();
+    let retrieved = Retrieved::new([queries, references], ranking, confidence, descriptors);
+    Ok(Retrieved { distances, similarities: Some(similarities), ..retrieved })
 }
 
 /// Retrieves from two files of descriptors by Euclidean distance.

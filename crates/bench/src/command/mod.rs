@@ -15,6 +15,7 @@ pub(crate) mod match_images;
 pub(crate) mod methods;
 mod named;
 pub(crate) mod predictions;
+mod report;
 mod retrieved;
 pub(crate) mod run;
 pub(crate) mod validate;

@@ -1,6 +1,6 @@
 //! What was retrieved for two sets of images or rows.
 
-use vpr_core::{Descriptors, GroundTruth, Ranking, retrieve};
+use vpr_core::{Descriptors, GroundTruth, Ranking, Similarities, retrieve};
 
 use super::named::Named;
 
@@ -9,6 +9,10 @@ pub(super) struct Retrieved {
     pub(super) queries: Named,
     pub(super) references: Named,
     pub(super) ranking: Ranking,
+    /// Distances of the ranked references; negative similarities for techniques without distances.
+    pub(super) distances: Vec<Vec<f64>>,
+    /// All similarities, for techniques that compute them.
+    pub(super) similarities: Option<Similarities>,
     /// The ranking by descriptors of single images, for networks whose descriptors depend on the batch.
     pub(super) alone: Option<Ranking>,
     /// How sure the best match of each query is; higher is surer.
@@ -27,8 +31,17 @@ impl Retrieved {
         confidence: Vec<f64>,
         descriptors: Option<(Descriptors, Descriptors)>,
     ) -> Self {
-        let (alone, truth) = (None, None);
-        Self { queries, references, ranking, alone, confidence, descriptors, truth }
+        Self {
+            queries,
+            references,
+            ranking,
+            distances: Vec::new(),
+            similarities: None,
+            alone: None,
+            confidence,
+            descriptors,
+            truth: None,
+        }
     }
 }
 
@@ -41,9 +54,11 @@ pub(super) fn nearest(
     k: usize,
 ) -> anyhow::Result<Retrieved> {
     let retrieval = retrieve(&query_rows, &reference_rows, k)?;
-    let confidence =
-        (0..retrieval.len()).map(|query| -f64::from(retrieval.distances(query)[0])).collect();
+    let of = |query: usize| retrieval.distances(query).iter().map(|&it| f64::from(it)).collect();
+    let distances: Vec<Vec<f64>> = (0..retrieval.len()).map(of).collect();
+    let confidence = distances.iter().map(|it| -it[0]).collect();
     let ranking = AsRef::<Ranking>::as_ref(&retrieval).clone();
     let descriptors = Some((query_rows, reference_rows));
-    Ok(Retrieved::new([queries, references], ranking, confidence, descriptors))
+    let retrieved = Retrieved::new([queries, references], ranking, confidence, descriptors);
+    Ok(Retrieved { distances, ..retrieved })
 }

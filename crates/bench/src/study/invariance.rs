@@ -213,10 +213,10 @@ fn report(
         x_label: "position".to_owned(),
         y_label: "score".to_owned(),
         curves: vec![
-            Curve { name: "same place".to_owned(), points: points(&curves.same) },
-            Curve { name: "other place".to_owned(), points: points(&curves.other) },
+            Curve::new("same place", points(&curves.same)),
+            Curve::new("other place", points(&curves.other)),
         ],
-        is_scatter: false,
+        ..Panel::default()
     });
     Ok(())
 }

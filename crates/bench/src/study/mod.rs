@@ -21,7 +21,7 @@ mod worlds;
 use std::sync::Arc;
 
 use serde::Deserialize;
-use vpr_core::{Provenance, Result};
+use vpr_core::Result;
 use vpr_data::Dataset;
 use vpr_report::{
     experiment::Experiment,
@@ -183,15 +183,6 @@ fn panel_of<'a>(figure: &'a mut Figure, title: &str, new: impl FnOnce() -> Panel
         figure.panels.len() - 1
     });
     &mut figure.panels[index]
-}
-
-/// What tells a curve computed here from the author's in a legend.
-fn origin_mark(provenance: Provenance) -> &'static str {
-    match provenance {
-        Provenance::Published | Provenance::Absent => "",
-        Provenance::Measured => " (measured)",
-        Provenance::Generated => " (generated)",
-    }
 }
 
 /// Computes what the experiment asks for, as far as its data is at hand.

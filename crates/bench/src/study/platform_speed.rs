@@ -6,7 +6,7 @@ use vpr_core::{
     metrics::{SearchCost, Timing, required_fps, retrieval_time, speed_limit},
 };
 use vpr_report::{
-    figure::{Curve, Figure, Panel},
+    figure::{Curve, Figure, Panel, Scale},
     table::{Cell, Table},
 };
 
@@ -35,6 +35,8 @@ pub(super) struct Drive<'a> {
 
 /// Images timed per technique.
 const TIMED: usize = 40;
+/// Pieces of the curve of what is required.
+const STEPS: u32 = 200;
 
 pub(super) fn run(
     table: &mut Table,
@@ -98,20 +100,21 @@ fn limits(
 
 fn panel(name: &str, timing: Timing, drive: &Drive<'_>) -> Result<Panel> {
     let required = required_fps(drive.frames_per_metre, drive.max_speed)?;
-    let mut curves = vec![Curve {
-        name: "required".to_owned(),
-        points: vec![(0.0, 0.0), (drive.max_speed, required)],
-    }];
+    // Proportional to speed, which is a curve where frames per second are drawn by factors.
+    let at = |step: u32| f64::from(step) / f64::from(STEPS);
+    let points = (1..=STEPS).map(|step| (at(step) * drive.max_speed, at(step) * required));
+    let mut curves = vec![Curve::new("required", points.collect())];
     for &size in drive.map_sizes {
         let fps = 1.0 / retrieval_time(timing, size, SearchCost::Linear)?;
         let points = vec![(0.0, fps), (drive.max_speed, fps)];
-        curves.push(Curve { name: format!("Z={size}"), points });
+        curves.push(Curve::new(format!("Z={size}"), points));
     }
     Ok(Panel {
         title: name.to_owned(),
         x_label: "platform speed, m/s".to_owned(),
         y_label: "frames per second".to_owned(),
         curves,
-        is_scatter: false,
+        y_scale: Scale::Log,
+        ..Panel::default()
     })
 }

@@ -15,6 +15,8 @@ use super::Context;
 
 /// Recalls at which the curves are sampled.
 const RECALLS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
+/// Recall below which precision rests on so few matches that it jumps.
+const SETTLED: f64 = 0.02;
 
 pub(super) fn run(
     table: &mut Table,
@@ -28,10 +30,8 @@ pub(super) fn run(
         match curve(&evaluation) {
             Ok(points) => {
                 sample(table, &subject, &points);
-                let name = format!("{}{}", subject.column, super::origin_mark(subject.provenance));
-                super::panel_of(&mut figure, &subject.row, panel)
-                    .curves
-                    .push(Curve { name, points });
+                let curve = Curve::new(subject.column, points).of(subject.provenance);
+                super::panel_of(&mut figure, &subject.row, panel).curves.push(curve);
             }
             Err(Error::Undefined { .. }) => {}
             Err(err) => return Err(err),
@@ -41,7 +41,12 @@ pub(super) fn run(
 }
 
 fn panel() -> Panel {
-    Panel { x_label: "recall".into(), y_label: "precision".into(), ..Panel::default() }
+    Panel {
+        x_label: "recall".into(),
+        y_label: "precision".into(),
+        settled_from: Some(SETTLED),
+        ..Panel::default()
+    }
 }
 
 /// `(recall, precision)` of the published definition, recall ascending.

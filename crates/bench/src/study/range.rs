@@ -30,8 +30,8 @@ pub(super) fn run(
                 Err(err) => return Err(err),
             }
         }
-        let name = format!("{}{}", subject.column, super::origin_mark(subject.provenance));
-        super::panel_of(&mut figure, &subject.row, panel).curves.push(Curve { name, points });
+        let curve = Curve::new(subject.column, points).of(subject.provenance);
+        super::panel_of(&mut figure, &subject.row, panel).curves.push(curve);
     }
     Ok(Some(figure))
 }

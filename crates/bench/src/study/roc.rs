@@ -40,8 +40,8 @@ pub(super) fn run(
             let reached = Ok(highest(&points, rate));
             table.push(subject.value_cell(&subject.label(), &column, definition, reached)?);
         }
-        let name = format!("{}{}", subject.column, super::origin_mark(subject.provenance));
-        super::panel_of(&mut figure, &subject.row, panel).curves.push(Curve { name, points });
+        let curve = Curve::new(subject.column, points).of(subject.provenance);
+        super::panel_of(&mut figure, &subject.row, panel).curves.push(curve);
     }
     Ok(curves.then_some(figure))
 }

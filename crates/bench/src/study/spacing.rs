@@ -26,8 +26,7 @@ pub(super) fn run(
             if definition == Definition::Corrected {
                 let points =
                     counts.iter().enumerate().skip(1).map(|(gap, &n)| (gap as f64, n as f64));
-                let name = format!("{}{}", subject.column, super::origin_mark(subject.provenance));
-                let curve = Curve { name, points: points.collect() };
+                let curve = Curve::new(subject.column, points.collect()).of(subject.provenance);
                 super::panel_of(&mut figure, &subject.row, panel).curves.push(curve);
             }
         }

@@ -62,14 +62,19 @@ fn swapped(table: &mut Table, datasets: &[String], context: Context<'_>) -> Resu
 
 /// One line per technique from the one direction to the other.
 fn draw(figure: &mut Figure, subject: &Subject, x: f64, auc: f64) {
-    let name = format!("{}{}", subject.column, super::origin_mark(subject.provenance));
+    let is_same = |curve: &&mut Curve| {
+        curve.name == subject.column && curve.origin == Some(subject.provenance)
+    };
     let panel = super::panel_of(figure, &subject.row, || Panel {
-        x_label: "0: as released, 1: queries and references exchanged".into(),
+        x_ticks: vec![(0.0, "as released".into()), (1.0, "exchanged".into())],
+        x_label: "queries and references".into(),
         y_label: "AUC-PR (published)".into(),
         ..Panel::default()
     });
-    match panel.curves.iter_mut().find(|curve| curve.name == name) {
-        Some(curve) => curve.points.push((x, auc)),
-        None => panel.curves.push(Curve { name, points: vec![(x, auc)] }),
+    if let Some(curve) = panel.curves.iter_mut().find(is_same) {
+        curve.points.push((x, auc));
+        return;
     }
+    let curve = Curve::new(subject.column, vec![(x, auc)]).of(subject.provenance);
+    panel.curves.push(curve);
 }

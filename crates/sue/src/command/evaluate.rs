@@ -6,11 +6,12 @@ use vpr_core::{
     metrics::bootstrap::{Interval, Resampling},
 };
 use vpr_report::{
-    cli::{self, Outcome},
+    cli::{self, Outcome, ReportArgs},
+    report::Run,
     table::{Cell, Format, Table},
 };
 
-use super::{input::InputArgs, truth::TruthArgs};
+use super::{input::InputArgs, report, truth::TruthArgs};
 
 /// Estimators, map, queries and their truth.
 #[derive(clap::Args)]
@@ -29,6 +30,8 @@ pub(crate) struct EvaluateArgs {
     /// Seed of the bootstrap
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    #[command(flatten)]
+    report: ReportArgs,
     /// Format on stdout
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
     format: Format,
@@ -47,10 +50,14 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         judged.base_rate()
     );
     let mut table = Table::new("evaluation", title);
-    let mut first: Option<Evaluation<'_>> = None;
+    let (mut first, mut runs): (Option<Evaluation<'_>>, Vec<Run>) = (None, Vec::new());
     for choice in &args.estimator {
         let prepared = choice.prepare(&input.settings, input.poses.as_ref())?;
-        let evaluation = Evaluation::new(&prepared.estimate(&retrieval)?, &judged)?;
+        let uncertainty = prepared.estimate(&retrieval)?;
+        let evaluation = Evaluation::new(&uncertainty, &judged)?;
+        if args.report.path.is_some() {
+            runs.push(report::run(prepared.name(), &retrieval, uncertainty));
+        }
         push_summary(&mut table, prepared.name(), &evaluation, &resampling)?;
         match &first {
             None => first = Some(evaluation),
@@ -60,7 +67,8 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
             }
         }
     }
-    cli::print(&table.render(args.format))?;
+    cli::print(&table.render_within(args.format, cli::columns()))?;
+    report::write(&args.report, &input, &truth, runs)?;
     Ok(Outcome::Success)
 }
 

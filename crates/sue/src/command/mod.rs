@@ -4,6 +4,7 @@ pub(crate) mod calibrate;
 pub(crate) mod estimate;
 pub(crate) mod evaluate;
 mod input;
+mod report;
 pub(crate) mod run;
 pub(crate) mod train;
 mod truth;

@@ -25,6 +25,7 @@ const WITHIN_CHANCE: &str =
     "not significantly different from SUE (paired bootstrap over queries, 95 %)";
 
 pub(super) fn run(table: &mut Table, subjects: &[Subject], context: Context<'_>) -> Result<()> {
+    table.highest_is_best = true;
     let all = open(table, subjects, REFERENCE, context)?;
     for (opened, verify) in &all {
         let scored = opened.score_all(verify, context)?;

@@ -7,7 +7,7 @@ use vpr_report::{
     page::Sheet,
     table::{Cell, Table},
 };
-use vpr_study::{ContactSheet, Frame};
+use vpr_study::{ContactSheet, Frame, Tile};
 
 use super::{
     Context, first_method,
@@ -85,12 +85,26 @@ fn ranks(uncertainty: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// The query over its `n` best references.
-fn column(opened: &Labelled, query: usize, n: usize) -> Vec<Frame> {
-    let references = opened.corpus.retrieval.indices(query);
+/// The query with a remark over its `n` best references with their distances.
+fn column(opened: &Labelled, query: usize, n: usize, remark: String) -> Vec<Tile> {
+    let retrieval = &opened.corpus.retrieval;
     let correct = |reference: usize| opened.corpus.truth.is_correct(query, reference);
-    let framed = references.iter().take(n).map(|&it| Frame::Reference(it, correct(it)));
-    std::iter::once(Frame::Query(query)).chain(framed).collect()
+    let ranked = retrieval.indices(query).into_iter().zip(retrieval.distances(query)).take(n);
+    let framed = ranked.map(|(&it, &distance)| Tile {
+        frame: Frame::Reference(it, correct(it)),
+        remark: format!("d {}", short(f64::from(distance))),
+    });
+    std::iter::once(Tile { frame: Frame::Query(query), remark }).chain(framed).collect()
+}
+
+/// A number in few letters.
+fn short(value: f64) -> String {
+    match value.abs() {
+        size if size >= 100.0 => format!("{value:.0}"),
+        size if size >= 1.0 || size == 0.0 => format!("{value:.2}"),
+        size if size >= 1e-3 => format!("{value:.3}"),
+        _ => format!("{value:.1e}"),
+    }
 }
 
 /// One tile in numbers: which query, how uncertain, whether its match is correct.
@@ -127,10 +141,11 @@ fn extremes(
                     &format!("{label} {}", i + 1),
                     (query, uncertainty[query]),
                 );
-                columns.push(column(opened, query, 1));
+                let remark = format!("u {}", short(uncertainty[query]));
+                columns.push(column(opened, query, 1, remark));
             }
         }
-        sheet.add_columns(columns);
+        sheet.add_columns(format!("{name}: least and most uncertain"), columns);
     }
 }
 
@@ -157,8 +172,8 @@ fn disagreements(
             let rank = ranks(uncertainty)[query];
             push(table, opened, label, &format!("share of queries below, {name}"), (query, rank));
         }
-        let row = column(opened, query, NEIGHBORS);
-        sheet.add_row(row);
+        let remark = format!("SUE {:.2} L2 {:.2}", sue[query], distance[query]);
+        sheet.add_row(label, column(opened, query, NEIGHBORS, remark));
     }
 }
 
@@ -180,9 +195,10 @@ fn complements(
         let row = format!("pair {}", i + 1);
         push(table, opened, &row, "share of queries below, SUE", (query, sue[query]));
         push(table, opened, &row, "share of queries below, verification", (query, verified[query]));
-        columns.push(column(opened, query, 1));
+        let remark = format!("SUE {:.2} GV {:.2}", sue[query], verified[query]);
+        columns.push(column(opened, query, 1, remark));
     }
-    sheet.add_columns(columns);
+    sheet.add_columns("correct, doubted by verification (GV) and not by SUE", columns);
 }
 
 fn ranked(
@@ -207,6 +223,8 @@ fn ranked(
         for (i, &query) in chosen.iter().enumerate() {
             push(table, opened, name, &format!("rank {}", i + 1), (query, uncertainty[query]));
         }
-        sheet.add_columns(chosen.iter().map(|&query| column(opened, query, 1)).collect());
+        let remark = |query: usize| format!("u {}", short(uncertainty[query]));
+        let columns = chosen.iter().map(|&query| column(opened, query, 1, remark(query))).collect();
+        sheet.add_columns(format!("{name}: from least to most uncertain"), columns);
     }
 }

@@ -52,7 +52,7 @@ pub(super) fn run(
             title: learned.name().to_owned(),
             x_label: dial.name.clone(),
             y_label: "mean variance".into(),
-            curves: vec![Curve { name: learned.name().to_owned(), points }],
+            curves: vec![Curve::new(learned.name(), points)],
             ..Panel::default()
         });
     }

@@ -15,6 +15,8 @@ use vpr_core::Evaluation;
 
 /// Recalls at which the curves are sampled.
 const RECALLS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
+/// Recall below which precision rests on so few matches that it jumps.
+const SETTLED: f64 = 0.02;
 
 pub(super) fn run(
     table: &mut Table,
@@ -32,6 +34,7 @@ pub(super) fn run(
             title: opened.row.clone(),
             x_label: "recall".into(),
             y_label: "precision".into(),
+            settled_from: Some(SETTLED),
             ..Panel::default()
         };
         for it in &scored {
@@ -39,7 +42,7 @@ pub(super) fn run(
             opened.push_auc(table, (&row, "AUC-PR"), it, None, &context.resampling())?;
             if let Some(points) = curve(&opened, it)? {
                 sample(table, &opened, &row, &points);
-                panel.curves.push(Curve { name: it.name.to_owned(), points });
+                panel.curves.push(Curve::new(it.name, points));
             }
         }
         figure.panels.push(panel);

@@ -1,7 +1,7 @@
 //! Two uncertainties of every query and the boundary of an SVM: figures 5.5, 5.11 and 5.12.
 
 use vpr_report::{
-    figure::{Curve, Figure, Panel},
+    figure::{Curve, Figure, Panel, Shape},
     table::{Cell, Table},
 };
 
@@ -132,7 +132,7 @@ fn panel(opened: &Labelled, pairs: &Pairs, learnt: &Pairs, svm: Option<&LinearSv
             let judged = pairs.values.iter().zip(opened.corpus.judged.correct());
             let points = judged.filter(|it| *it.1 == wanted);
             let points = points.map(|(it, _)| (x(it[0]), y(it[1]))).collect();
-            Curve { name: name.to_owned(), points }
+            Curve::new(name, points).shaped(Shape::Points)
         })
         .into();
     for (name, level) in
@@ -145,13 +145,13 @@ fn panel(opened: &Labelled, pairs: &Pairs, learnt: &Pairs, svm: Option<&LinearSv
             let scaled = (second - y_scale.0) / y_scale.1;
             (-0.2..=1.5).contains(&scaled).then(|| (x(first), y(second)))
         });
-        curves.push(Curve { name: name.to_owned(), points: points.collect() });
+        curves.push(Curve::new(name, points.collect()));
     }
     Panel {
         title: opened.row.clone(),
         x_label: format!("{}, scaled", pairs.labels.0),
         y_label: format!("log₁₀ of {}, scaled", pairs.labels.1),
         curves,
-        is_scatter: true,
+        ..Panel::default()
     }
 }

@@ -55,7 +55,7 @@ pub(super) fn run(table: &mut Table, subjects: &[Subject], context: Context<'_>)
                 title: row,
                 x_label: "distance to the nearest neighbour, m".into(),
                 y_label: "share".into(),
-                curves: vec![Curve { name: String::new(), points: histogram(&spacing) }],
+                curves: vec![Curve::new("", histogram(&spacing))],
                 ..Panel::default()
             });
         }

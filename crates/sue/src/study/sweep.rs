@@ -2,7 +2,7 @@
 
 use vpr_core::{Definition, Error as CoreError, Evaluation};
 use vpr_report::{
-    figure::{Curve, Figure, Panel},
+    figure::{Curve, Figure, Panel, Scale},
     table::{Cell, Table},
 };
 
@@ -19,26 +19,38 @@ pub(super) fn run(
     lambda: &[f64],
     context: Context<'_>,
 ) -> Result<Figure> {
-    let panel = |x_label: &str, title: &str| Panel {
-        title: title.to_owned(),
-        x_label: x_label.to_owned(),
-        y_label: "AUC-PR".to_owned(),
-        ..Panel::default()
-    };
-    let mut over_k = panel("K", "λ = 350");
-    let mut over_lambda = panel("log₁₀ λ", "K = 10");
+    let (mut over_k, mut over_lambda) = (Vec::new(), Vec::new());
     let base = EstimatorSettings::default();
     for (opened, _) in open(table, subjects, "K=10", context)? {
         let with_k = |k: usize| SueParams { k, ..base.sue };
         let at_k = k.iter().map(|&k| (k as f64, format!("K={k}"), with_k(k)));
         let points = curve(table, &opened, at_k)?;
-        over_k.curves.push(Curve { name: opened.row.clone(), points });
+        draw(&mut over_k, ("K", "λ = 350", Scale::Linear), &opened, points);
         let with_lambda = |lambda: f64| SueParams { lambda, ..base.sue };
-        let at_lambda = lambda.iter().map(|&it| (it.log10(), format!("λ={it}"), with_lambda(it)));
+        let at_lambda = lambda.iter().map(|&it| (it, format!("λ={it}"), with_lambda(it)));
         let points = curve(table, &opened, at_lambda)?;
-        over_lambda.curves.push(Curve { name: opened.row.clone(), points });
+        draw(&mut over_lambda, ("λ", "K = 10", Scale::Log), &opened, points);
     }
-    Ok(Figure { panels: vec![over_k, over_lambda] })
+    Ok(Figure { panels: [over_k, over_lambda].concat() })
+}
+
+/// Adds a curve to the panel of its dataset; datasets under one encoder only share a panel.
+fn draw(
+    panels: &mut Vec<Panel>,
+    (x_label, fixed, x_scale): (&str, &str, Scale),
+    opened: &Labelled,
+    points: Vec<(f64, f64)>,
+) {
+    let row = opened.row.as_str();
+    let (dataset, name) = row.split_once(" / ").unwrap_or(("generated counterparts", row));
+    let title = format!("{dataset}, {fixed}");
+    let index = panels.iter().position(|panel| panel.title == title).unwrap_or_else(|| {
+        let (x_label, y_label) = (x_label.to_owned(), "AUC-PR".to_owned());
+        panels.push(Panel { title, x_label, y_label, x_scale, ..Panel::default() });
+        panels.len() - 1
+    });
+    let origin = opened.corpus.provenance;
+    panels[index].curves.push(Curve::new(name, points).of(origin));
 }
 
 /// One cell and one point per setting.

@@ -1,16 +1,22 @@
 //! Tables of numbers that say where they come from.
 
+mod arrange;
 mod check;
 mod csv_cell;
+mod notes;
+mod number;
 mod page;
 mod render;
+
+#[cfg(test)]
+mod tests;
 
 use serde::{Deserialize, Serialize};
 use vpr_core::Provenance;
 
 pub use check::{Checked, Finding, check};
 pub use page::{Drawings, csv_page, markdown_page, read_csv};
-pub use render::Format;
+pub use render::{Format, WIDTH};
 
 /// What stands in a cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -203,13 +209,22 @@ pub struct Table {
     /// Decimals the thesis prints and how it gets them; `None` if agreement is not judged.
     #[serde(skip)]
     pub rounding: Option<(Rounding, u32)>,
+    /// Whether high values are good, so that the best of a row may stand out.
+    #[serde(skip)]
+    pub highest_is_best: bool,
 }
 
 impl Table {
     /// An empty table.
     #[must_use]
     pub fn new(id: impl Into<String>, title: impl Into<String>) -> Self {
-        Self { id: id.into(), title: title.into(), cells: Vec::new(), rounding: None }
+        Self {
+            id: id.into(),
+            title: title.into(),
+            cells: Vec::new(),
+            rounding: None,
+            highest_is_best: false,
+        }
     }
 
     /// Adds a cell.
@@ -231,49 +246,23 @@ impl Table {
         }
     }
 
-    /// This table in one of the four formats, ending in a newline.
+    /// How many of the thesis' numbers ours read like, and how many are the same quantity.
+    #[must_use]
+    pub fn agreement(&self) -> (usize, usize) {
+        let judged: Vec<bool> = self.cells.iter().filter_map(|cell| self.agrees(cell)).collect();
+        (judged.iter().filter(|agrees| **agrees).count(), judged.len())
+    }
+
+    /// This table in one of the four formats, ending in a newline, for lines of [`WIDTH`] letters.
     #[must_use]
     pub fn render(&self, format: Format) -> String {
-        render::render(self, format)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn truncation_and_rounding_differ_at_the_last_digit() {
-        assert!(Rounding::Truncated.agrees(0.818_457, 0.81, 2));
-        assert!(!Rounding::Rounded.agrees(0.818_457, 0.81, 2));
-        assert!(Rounding::Rounded.agrees(0.818_457, 0.82, 2));
-        assert!(Rounding::Truncated.agrees(0.7, 0.70, 2));
-        assert!(!Rounding::Truncated.agrees(0.8219, 0.83, 2));
+        render::render(self, format, WIDTH)
     }
 
-    #[test]
-    fn only_the_same_quantity_is_judged() {
-        let mut table = Table::new("table-0", "");
-        table.rounding = Some((Rounding::Rounded, 1));
-        let mut cell = Cell::new("row", "column", 0.5, Provenance::Published, 1);
-        cell.thesis = Some(Value::Number(0.5));
-        assert_eq!(table.agrees(&cell), Some(true));
-        assert_eq!(table.agrees(&cell.clone().defined("corrected")), None);
-        cell.provenance = Provenance::Generated;
-        assert_eq!(table.agrees(&cell), None);
-    }
-
-    #[test]
-    fn json_has_exactly_the_documented_keys() {
-        let mut table = Table::new("table-0", "Title");
-        table.push(Cell::absent("row", "column", "no data"));
-        let json: serde_json::Value = serde_json::from_str(&table.render(Format::Json)).unwrap();
-        assert_eq!(
-            json,
-            serde_json::json!({"id": "table-0", "title": "Title", "cells": [{
-                "row": "row", "column": "column", "value": null, "thesis": null,
-                "definition": null, "provenance": "absent", "n": 0, "interval": null,
-                "note": "no data"}]})
-        );
+    /// As [`Self::render`], for lines of another width: a wider table is cut into parts of its
+    /// columns, or row by row.
+    #[must_use]
+    pub fn render_within(&self, format: Format, width: usize) -> String {
+        render::render(self, format, width)
     }
 }

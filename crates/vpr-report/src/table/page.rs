@@ -5,6 +5,9 @@ use std::path::Path;
 use super::{Cell, Format, Table, csv_cell::CsvCell, render};
 use vpr_core::{Error, Result};
 
+/// Lines of numbers beyond which a figure's are folded.
+const LONG: usize = 60;
+
 /// The drawings that a page shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Drawings<'a> {
@@ -22,14 +25,24 @@ pub fn markdown_page(table: &Table, source: &str, drawings: Drawings<'_>) -> Str
     let figure = drawings.figure.then(|| format!("![{0}]({0}.svg)\n\n", table.id));
     let sheet = drawings.sheet.map(|legend| format!("![{0}]({0}.png)\n\n{legend}\n\n", table.id));
     let picture: String = figure.into_iter().chain(sheet).collect();
+    let body = stable.render(Format::Markdown);
+    // The numbers behind a figure are for those who look for them.
+    let body = if drawings.figure && body.lines().count() > LONG {
+        format!("<details>\n<summary>The numbers</summary>\n\n{body}\n</details>\n")
+    } else {
+        body
+    };
+    let verdict = match stable.agreement() {
+        (_, 0) => String::new(),
+        (n_agree, n) => format!("Against the thesis: {n_agree} of {n} numbers read the same.\n\n"),
+    };
     format!(
         "# {id}: {title}\n\nSource: {source}. Written by `cargo xtask reproduce {id} --write`; do not edit.\n\n\
          Origins: `published`, computed from the author's published files; `measured`, from real images; \
          `generated`, from generated images; `absent`, no data at hand. ✓ reads like the thesis, ✗ does not.\n\n\
-         {picture}{body}",
+         {verdict}{picture}{body}",
         id = table.id,
         title = table.title,
-        body = stable.render(Format::Markdown),
     )
 }
 

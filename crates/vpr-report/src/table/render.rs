@@ -1,11 +1,18 @@
 //! A table as text, CSV, JSON or Markdown.
 
+use std::fmt::Write as _;
+
 use comfy_table::{Table as Grid, TableStyle, presets};
 use serde::{Deserialize, Serialize};
 
-use vpr_core::Provenance;
+use super::{
+    Cell, Table,
+    arrange::{Block, Pivot},
+    csv_cell::CsvCell,
+};
 
-use super::{Cell, Table, Value, csv_cell::CsvCell};
+/// Letters of a line where nothing else is known, and on pages.
+pub const WIDTH: usize = 100;
 
 /// How a table is printed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,15 +30,21 @@ pub enum Format {
     Markdown,
 }
 
-pub(super) fn render(table: &Table, format: Format) -> String {
+pub(super) fn render(table: &Table, format: Format, width: usize) -> String {
     match format {
         Format::Table => {
-            let (grid, notes) = pivot(table);
-            format!("{}: {}\n{}\n{notes}", table.id, table.title, grid.render(presets::NOTHING))
+            let pivot = Pivot::new(table, |text| text + " *");
+            let blocks = blocks(&pivot.blocks(width), presets::NOTHING, "");
+            let notes = wrapped(&notes(&pivot, "*: "), width);
+            format!("{}: {}\n{blocks}{notes}", table.id, table.title)
         }
         Format::Markdown => {
-            let (grid, notes) = pivot(table);
-            format!("{}\n\n{notes}", grid.render(presets::ASCII_MARKDOWN))
+            let pivot = Pivot::new(table, |text| format!("**{text}**"));
+            let blocks = blocks(&pivot.blocks(width), presets::ASCII_MARKDOWN, "### ");
+            let notes = notes(&pivot, "Bold: ").replace("\n[", "\n- [");
+            // Notes are items of a list, or they would run together.
+            let item = if notes.starts_with('[') { "- " } else { "" };
+            format!("{blocks}\n{item}{notes}")
         }
         Format::Csv => csv(table.cells.iter()),
         Format::Json => {
@@ -50,132 +63,76 @@ pub(super) fn csv<'a>(cells: impl Iterator<Item = &'a Cell>) -> String {
     String::from_utf8(writer.into_inner().expect("writing to memory")).expect("labels are UTF-8")
 }
 
-/// A number as people read it: whole, or four decimals, or two if large.
-pub(super) fn number(value: f64) -> String {
-    let magnitude = value.abs();
-    if value.fract() == 0.0 && magnitude < 1e9 {
-        format!("{value}")
-    } else if magnitude >= 100.0 {
-        format!("{value:.2}")
-    } else if magnitude >= 1e-3 {
-        format!("{value:.4}")
-    } else {
-        format!("{value:.2e}")
-    }
-}
-
-fn text(value: &Value) -> String {
-    match value {
-        Value::Number(value) => number(*value),
-        Value::Text(text) => text.clone(),
-    }
-}
-
-/// Header and lines of the pivoted table.
-struct Pivot {
-    header: Vec<String>,
-    lines: Vec<Vec<String>>,
-}
-
-impl Pivot {
-    fn render(&self, style: TableStyle) -> String {
+fn blocks(blocks: &[Block], style: TableStyle, heading: &str) -> String {
+    // In Markdown a bar ends a cell and a line a table.
+    let safe = |text: &String| match heading {
+        "" => text.clone(),
+        _ => text.replace('|', "\\|").replace(['\r', '\n'], " "),
+    };
+    let mut text = String::new();
+    for (index, block) in blocks.iter().enumerate() {
+        if index > 0 {
+            text.push('\n');
+        }
+        if let Some(row) = &block.heading {
+            let after = if heading.is_empty() { "" } else { "\n" };
+            let _ = write!(text, "{heading}{}\n{after}", safe(row));
+        }
         let mut grid = Grid::new();
-        grid.load_style(style).set_header(&self.header).add_rows(&self.lines);
-        let lines = grid.lines().map(|line| line.trim_end().to_owned());
-        lines.collect::<Vec<_>>().join("\n")
-    }
-}
-
-/// One line per row, definition and origin; a line with the thesis' values above them.
-fn pivot(table: &Table) -> (Pivot, String) {
-    let columns = in_order(table.cells.iter().map(|cell| cell.column.as_str()));
-    let has_definitions = table.cells.iter().any(|cell| cell.definition.is_some());
-    let mut notes: Vec<&str> = Vec::new();
-    let mut lines = Vec::new();
-    for row in in_order(table.cells.iter().map(|cell| cell.row.as_str())) {
-        let cells: Vec<&Cell> = table.cells.iter().filter(|cell| cell.row == row).collect();
-        if cells.iter().any(|cell| cell.thesis.is_some()) {
-            let thesis = |column: &&str| {
-                let cell =
-                    cells.iter().find(|cell| cell.column == *column && cell.thesis.is_some());
-                cell.and_then(|cell| cell.thesis.as_ref()).map_or_else(String::new, text)
-            };
-            lines.push(line(row, "thesis", None, has_definitions, columns.iter().map(thesis)));
-        }
-        let groups =
-            in_order(cells.iter().map(|cell| (cell.provenance, cell.definition.as_deref())));
-        for (provenance, definition) in groups {
-            let entry = |column: &&str| {
-                let cell = cells.iter().find(|cell| {
-                    cell.column == *column
-                        && (cell.provenance, cell.definition.as_deref()) == (provenance, definition)
-                });
-                cell.map_or_else(String::new, |cell| entry(table, cell, &mut notes))
-            };
-            let origin = provenance.to_string();
-            lines.push(line(row, &origin, definition, has_definitions, columns.iter().map(entry)));
+        let lines = block.lines.iter().map(|line| line.iter().map(safe).collect::<Vec<_>>());
+        grid.load_style(style);
+        grid.set_header(block.header.iter().map(safe).collect::<Vec<_>>()).add_rows(lines);
+        for line in grid.lines() {
+            text += line.trim_end();
+            text.push('\n');
         }
     }
-    let labels = ["", "origin"].into_iter().chain(has_definitions.then_some("definition"));
-    let header = labels.chain(columns).map(str::to_owned).collect();
-    let notes: Vec<String> =
-        (1..).zip(&notes).map(|(number, note)| format!("[{number}] {note}\n")).collect();
-    (Pivot { header, lines }, notes.concat())
+    text
 }
 
-fn line(
-    row: &str,
-    origin: &str,
-    definition: Option<&str>,
-    has_definitions: bool,
-    entries: impl Iterator<Item = String>,
-) -> Vec<String> {
-    let mut line = vec![row.to_owned(), origin.to_owned()];
-    if has_definitions {
-        line.push(definition.unwrap_or_default().to_owned());
+/// Lines broken between words, so that none is longer than the page.
+fn wrapped(text: &str, width: usize) -> String {
+    let mut wrapped = String::new();
+    for line in text.lines() {
+        let mut length = 0;
+        for word in line.split(' ') {
+            let n = word.chars().count();
+            if length > 0 && length + 1 + n > width {
+                wrapped.push_str("\n    ");
+                length = 4;
+            } else if length > 0 {
+                wrapped.push(' ');
+                length += 1;
+            }
+            wrapped.push_str(word);
+            length += n;
+        }
+        wrapped.push('\n');
     }
-    line.extend(entries);
-    line
+    wrapped
 }
 
-/// Value, agreement mark and footnote number of one cell.
-fn entry<'a>(table: &Table, cell: &'a Cell, notes: &mut Vec<&'a str>) -> String {
-    let value = match (&cell.value, cell.provenance) {
-        (Some(value), _) => text(value),
-        (None, Provenance::Absent) => "absent".to_owned(),
-        (None, _) => String::new(),
+/// What the marks mean.
+fn notes(pivot: &Pivot<'_>, best: &str) -> String {
+    let best = if pivot.has_best {
+        format!(
+            "{best}the best of its row, its 95 % interval above all others'; intervals that \
+             overlap may still differ.\n"
+        )
+    } else {
+        String::new()
     };
-    let mark = match table.agrees(cell) {
-        Some(true) => " ✓",
-        Some(false) => " ✗",
-        None => "",
-    };
-    let note = cell.note.as_deref().filter(|_| !cell.quiet).map_or_else(String::new, |note| {
-        let known = notes.iter().position(|it| *it == note);
-        let index = known.unwrap_or_else(|| {
-            notes.push(note);
-            notes.len() - 1
-        });
-        format!(" [{}]", index + 1)
-    });
-    format!("{value}{mark}{note}")
-}
-
-/// The distinct items, in order of first appearance.
-fn in_order<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
-    let mut distinct = Vec::new();
-    for item in items {
-        if !distinct.contains(&item) {
-            distinct.push(item);
-        }
-    }
-    distinct
+    let notes = pivot.notes.text();
+    let between = if best.is_empty() || notes.is_empty() { "" } else { "\n" };
+    format!("{best}{between}{notes}")
 }
 
 #[cfg(test)]
 mod tests {
+    use vpr_core::Provenance;
+
     use super::*;
-    use crate::table::Rounding;
+    use crate::table::{Rounding, Value};
 
     fn table() -> Table {
         let mut table = Table::new("table-0", "AUC-PR");
@@ -195,8 +152,8 @@ mod tests {
         let lines = [
             "table-0: AUC-PR",
             "           origin     definition  HOG         CALC",
-            " Corridor  thesis                 0.6800      0.7800",
-            " Corridor  published  published   0.6971 ✗    0.7876 ✓",
+            " Corridor  thesis                 .6800       .7800",
+            " Corridor  published  published   .6971 ✗     .7876 ✓",
             " Nordland  absent                 absent [1]  absent [1]",
             "[1] Nordland: not at hand",
         ];
@@ -207,15 +164,20 @@ mod tests {
     }
 
     #[test]
-    fn intervals_are_columns_and_no_footnotes() {
+    fn the_best_stands_out_only_beyond_the_intervals() {
         let mut table = Table::new("table-0", "t");
-        for (column, low) in [("HOG", 0.4), ("CALC", 0.45)] {
-            let cell = Cell::new("Corridor", column, 0.5, Provenance::Measured, 9);
-            table.push(cell.noted("within chance").within(low, 0.6, "bootstrap"));
+        for (row, low) in [("sure", 0.7), ("unsure", 0.5)] {
+            let cell = |column, value| Cell::new(row, column, value, Provenance::Measured, 99);
+            table.push(cell("base rate", 0.99));
+            table.push(cell("HOG", 0.5).within(0.4, 0.6, "bootstrap"));
+            table.push(cell("CALC", 0.75).within(low, 0.8, "bootstrap"));
         }
-        let text = table.render(Format::Table);
-        assert!(text.ends_with("[1] within chance\n"), "{text}");
-        assert!(table.render(Format::Csv).contains(",0.45,0.6,bootstrap,within chance\n"));
+        assert!(!table.render(Format::Markdown).contains("**"), "nobody said that high is good");
+        table.highest_is_best = true;
+        let text = table.render(Format::Markdown);
+        assert!(text.contains("**.750 ± .05**") && text.matches("**").count() == 2, "{text}");
+        assert!(text.contains("Bold: the best of its row"), "{text}");
+        assert!(table.render(Format::Table).contains(".750 ± .05 *"));
     }
 
     #[test]
@@ -231,11 +193,5 @@ mod tests {
             table().render(Format::Csv).lines().map(str::trim_end).collect::<Vec<_>>(),
             lines
         );
-    }
-
-    #[test]
-    fn numbers_read_well() {
-        let printed = [0.0, 0.5, 111.0, 35_721.0, 138.384, 2.4e-6].map(number);
-        assert_eq!(printed, ["0", "0.5000", "111", "35721", "138.38", "2.40e-6"]);
     }
 }

@@ -30,7 +30,8 @@ pub(super) fn run(
             intervals.extend(recall(table, &row, world, runner, context)?);
         }
         let points = dial.values.iter().zip(&intervals).map(|(&x, it)| (x, it.estimate)).collect();
-        panel.curves.push(Curve { name: runner.column.to_owned(), points });
+        let band = intervals.iter().map(|it| (it.low, it.high)).collect();
+        panel.curves.push(Curve::new(runner.column, points).within(band));
         let row = format!("{}: how recall@1 moves", dial.name);
         let text = trend(&dial.values, &intervals);
         let n = intervals.len();

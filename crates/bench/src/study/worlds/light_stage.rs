@@ -5,7 +5,7 @@ use std::path::Path;
 
 use vpr_core::{Result, metrics::spearman};
 use vpr_report::{
-    figure::{Curve, Figure, Panel},
+    figure::{Curve, Figure, Panel, Shape},
     table::{Cell, Table},
 };
 use vpr_study::Direction;
@@ -45,7 +45,6 @@ pub(super) fn run(
         title: "light-stage: score over splitting".into(),
         x_label: "splitting of brightness (σ of log)".into(),
         y_label: "score with the key frame".into(),
-        is_scatter: true,
         ..Panel::default()
     };
     for runner in techniques(context)? {
@@ -69,7 +68,7 @@ pub(super) fn run(
         let verdict = Cell::new(row, column, text, dataset.provenance, n);
         table.push(verdict.noted("yes: the correlation with splitting is negative and below that with even change, and the lights that split most score lower"));
         let points = pairs.iter().map(|(change, score)| (change.split, *score)).collect();
-        panel.curves.push(Curve { name: column.to_owned(), points });
+        panel.curves.push(Curve::new(column, points).shaped(Shape::Points));
     }
     figure.panels.push(panel);
     Ok(())

@@ -12,7 +12,7 @@ use vpr_core::{
 };
 use vpr_data::Dataset;
 use vpr_report::{
-    figure::{Curve, Figure, Panel},
+    figure::{Curve, Figure, Panel, Shape},
     table::{Cell, Table},
 };
 
@@ -222,16 +222,18 @@ fn same_kind(clouds: &[Cloud]) -> (f64, f64) {
 }
 
 fn panel(column: &str, clouds: &[Cloud]) -> Panel {
-    let curve = |cloud: &Cloud| Curve {
-        name: if cloud.is_real { format!("{} (real)", cloud.name) } else { cloud.name.clone() },
-        points: cloud.points.rows().into_iter().map(|point| (point[0], point[1])).collect(),
+    let curve = |cloud: &Cloud| {
+        let name =
+            if cloud.is_real { format!("{} (real)", cloud.name) } else { cloud.name.clone() };
+        let points = cloud.points.rows().into_iter().map(|point| (point[0], point[1])).collect();
+        Curve::new(name, points).shaped(Shape::Points)
     };
     Panel {
         title: format!("{column} of real and generated places"),
         x_label: "first principal component".into(),
         y_label: "second".into(),
         curves: clouds.iter().map(curve).collect(),
-        is_scatter: true,
+        ..Panel::default()
     }
 }
 

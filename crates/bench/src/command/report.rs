@@ -1,0 +1,77 @@
+//! The report of `bench evaluate`: what was found, to look at.
+
+use std::path::PathBuf;
+
+use vpr_core::{GroundTruth, Similarities};
+use vpr_report::{
+    cli,
+    report::{Dataset, Match, Report, Run},
+};
+use vpr_study::thumbnails;
+
+use super::{evaluate::EvaluateArgs, retrieved::Retrieved};
+
+/// Largest number of similarities of which a picture is made.
+const MATRIX: usize = 100_000_000;
+
+/// Writes the report that the flags ask for, if any.
+pub(super) fn write(
+    args: &EvaluateArgs,
+    retrieved: &Retrieved,
+    truth: Option<&GroundTruth>,
+) -> anyhow::Result<()> {
+    if args.report.path.is_none() {
+        return Ok(());
+    }
+    let (queries, references) = (&retrieved.queries, &retrieved.references);
+    let pictures = thumbnails(&queries.names, &references.names);
+    // Rows of a file of descriptors have no pictures.
+    let has_pictures = args.database_descriptors.is_none();
+    let names = |names: &[PathBuf]| names.iter().map(|it| it.display().to_string()).collect();
+    let name = args.dataset.clone().unwrap_or_else(|| "images".to_owned());
+    let is_small = |it: &&Similarities| it.n_queries() * it.n_references() <= MATRIX;
+    let dataset = Dataset {
+        name,
+        queries: names(&queries.names),
+        references: names(&references.names),
+        poses: queries.poses.as_ref().zip(references.poses.as_ref()),
+        truth,
+        thumbnails: if has_pictures { Some(&pictures) } else { None },
+        similarities: retrieved.similarities.as_ref().filter(is_small),
+    };
+    let matches = |(query, distances): (usize, &Vec<f64>)| {
+        let ranked = retrieved.ranking.indices(query).into_iter().zip(distances);
+        ranked.map(|(&reference, &distance)| Match { reference, distance, inliers: None }).collect()
+    };
+    let is_similarity = retrieved.similarities.is_some();
+    let run = Run {
+        name: if has_pictures { args.method.clone() } else { "descriptors".to_owned() },
+        matches: retrieved.distances.iter().enumerate().map(matches).collect(),
+        estimator: is_similarity.then(|| "negative similarity of the best match".to_owned()),
+        ..Run::default()
+    };
+    args.report.write(&Report {
+        title: format!("{} on {}", run.name, dataset.name),
+        facts: vec![
+            ("command".to_owned(), cli::command_line()),
+            ("protocol".to_owned(), protocol(args, truth)),
+            ("program".to_owned(), format!("bench {}", env!("CARGO_PKG_VERSION"))),
+        ],
+        datasets: vec![dataset],
+        runs: vec![run],
+        budget: args.report.budget(),
+    })
+}
+
+/// Which references count as correct.
+fn protocol(args: &EvaluateArgs, truth: Option<&GroundTruth>) -> String {
+    match (truth, &args.ground_truth, &args.dataset) {
+        (None, ..) => "nothing is judged".to_owned(),
+        (_, Some(path), _) => format!("correct references as {} lists them", path.display()),
+        (_, _, Some(dataset)) => format!("correct references as `{dataset}` defines them"),
+        _ => format!(
+            "a reference is correct within {} m, the limit included",
+            args.positive_dist_threshold
+        ),
+    }
+}

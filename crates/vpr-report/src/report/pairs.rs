@@ -1,0 +1,84 @@
+//! Wins and losses per query between two runs on the same dataset.
+
+use std::io::{self, Write};
+
+use super::{Judged, Report, escape};
+
+/// Pairs listed.
+const MOST: usize = 15;
+
+pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged]) -> io::Result<()> {
+    let pairs: Vec<(usize, usize)> = (0..judged.len())
+        .flat_map(|first| (first + 1..judged.len()).map(move |second| (first, second)))
+        .filter(|&(a, b)| report.runs[a].dataset == report.runs[b].dataset)
+        // Runs that differ in their uncertainties only find the same references.
+        .filter(|&(a, b)| judged[a].correct.is_some() && judged[a].correct != judged[b].correct)
+        .take(MOST)
+        .collect();
+    if pairs.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        out,
+        "<section id=\"pairs\">\n<h2>Query by query</h2>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"wins and losses\">\n<table>\n<thead><tr>\
+         <th scope=\"col\">first</th><th scope=\"col\">second</th><th scope=\"col\">both right</th>\
+         <th scope=\"col\">only first</th><th scope=\"col\">only second</th><th scope=\"col\">both wrong</th>\
+         <th scope=\"col\">chance of so uneven a split</th></tr></thead>\n<tbody>"
+    )?;
+    for (a, b) in pairs {
+        let (Some(first), Some(second)) = (&judged[a].correct, &judged[b].correct) else {
+            continue;
+        };
+        let count = |wanted: (bool, bool)| {
+            first.iter().zip(second).filter(|it| (*it.0, *it.1) == wanted).count()
+        };
+        let (wins, losses) = (count((true, false)), count((false, true)));
+        let p = sign_test(wins, losses);
+        let p = if p < 0.001 { "&lt; 0.001".to_owned() } else { format!("{p:.3}") };
+        writeln!(
+            out,
+            "<tr><td>{}</td><td>{}</td><td>{}</td><td>{wins}</td><td>{losses}</td><td>{}</td><td>{p}</td></tr>",
+            escape(&report.runs[a].name),
+            escape(&report.runs[b].name),
+            count((true, true)),
+            count((false, false)),
+        )?;
+    }
+    writeln!(
+        out,
+        "</tbody>\n</table>\n</div>\n<p class=\"notes\">The chance (McNemar's exact test, two-sided) is that of a split at \
+         least as uneven if both were equally good; below 0.05 the difference is more than luck of the \
+         queries.</p>\n</section>"
+    )
+}
+
+/// Two-sided exact sign test: the chance that of `wins + losses` fair coins so few or fewer fall on
+/// the rarer side, twice.
+fn sign_test(wins: usize, losses: usize) -> f64 {
+    let n = wins + losses;
+    let log_half = -(n as f64) * std::f64::consts::LN_2;
+    // The logarithm of each binomial coefficient from the one before.
+    let (mut log_choose, mut tail) = (0.0, 0.0);
+    for k in 0..=wins.min(losses) {
+        if k > 0 {
+            log_choose += ((n - k + 1) as f64 / k as f64).ln();
+        }
+        tail += (log_choose + log_half).exp();
+    }
+    (2.0 * tail).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sign_test_counts_coins() {
+        // Of three coins: all on one side, 2 · 1/8.
+        assert!((sign_test(3, 0) - 0.25).abs() < 1e-12);
+        // 2 · (1 + 5) / 32
+        assert!((sign_test(1, 4) - 0.375).abs() < 1e-12);
+        assert!((sign_test(0, 0) - 1.0).abs() < 1e-12 && (sign_test(7, 7) - 1.0).abs() < 1e-12);
+        assert!(sign_test(9000, 100) < 1e-100);
+    }
+}
