@@ -141,3 +141,88 @@ impl Regressor for NetworkRegressor {
         Ok(Told::default())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+    use vpr_core::Pose;
+
+    use super::*;
+    use crate::regression::Anchor;
+
+    fn golden(name: &str) -> std::path::PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/golden/copr_regressor").join(name)
+    }
+
+    fn regress(network: &NetworkRegressor, pairs: &[(Pose, Pose)], rows: &[f32]) -> Vec<f32> {
+        let dim = network.dimension();
+        let request = |(target, (anchor, pose)): (usize, &'_ (Pose, Pose))| {
+            (target, *anchor, *pose, &rows[target * dim..][..dim])
+        };
+        let all: Vec<_> = pairs.iter().enumerate().map(request).collect();
+        let requests: Vec<Request<'_>> = all
+            .iter()
+            .map(|(target, anchor, pose, descriptor)| Request {
+                target: *target,
+                pose: *pose,
+                anchors: vec![Anchor { pose: anchor, descriptor }],
+            })
+            .collect();
+        let mut out = vec![0.0; pairs.len() * dim];
+        network.regress(&requests, &mut out).unwrap();
+        out
+    }
+
+    #[test]
+    fn published_is_the_official_network() {
+        let io = Weights::open(&golden("io.safetensors")).unwrap();
+        let values = |key: &str| io.get(key).unwrap().data.clone();
+        let (relative, expected) = (values("input.relative_pose"), values("output.descriptor"));
+        // The anchor stands at the origin; the official quaternions have any length.
+        let pose = |way: &[f32]| {
+            let [tx, ty, tz, w, i, j, k] = [0, 1, 2, 3, 4, 5, 6].map(|at| f64::from(way[at]));
+            let turn = UnitQuaternion::new_unchecked(Quaternion::new(w, i, j, k));
+            (Pose::identity(), Isometry3::from_parts(Translation3::new(tx, ty, tz), turn))
+        };
+        let pairs: Vec<_> = relative.chunks(RELATIVE_POSE).map(pose).collect();
+        for file in ["weights.safetensors", "weights.pth"] {
+            let network = NetworkRegressor::open(&golden(file)).unwrap();
+            assert_eq!((network.dimension(), network.definition()), (32, Definition::Published));
+            let found = regress(&network, &pairs, &values("input.anchor"));
+            for (found, expected) in found.iter().zip(&expected) {
+                approx::assert_abs_diff_eq!(found, expected, epsilon = 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn corrected_sees_the_same_in_a_turned_and_shifted_world() {
+        let open = || NetworkRegressor::open(&golden("weights.safetensors")).unwrap();
+        let rows: Vec<f32> = (0_u8..96).map(|at| f32::from(at).sin()).collect();
+        let pose = |at: u8| {
+            let [a, b, c] = [0.7, 1.1, 1.9].map(|rate: f64| (rate * f64::from(at)).sin());
+            Isometry3::new([3.0 * a, 3.0 * b, 3.0 * c].into(), [c, a, b].into())
+        };
+        let pairs: Vec<(Pose, Pose)> = (0..3).map(|at| (pose(at), pose(at + 9))).collect();
+        let by = Isometry3::new([40.0, -7.0, 3.0].into(), [1.0, -2.0, 0.5].into());
+        let moved: Vec<_> =
+            pairs.iter().map(|(anchor, target)| (by * anchor, by * target)).collect();
+        let difference = |network: &NetworkRegressor| {
+            let (here, there) = (regress(network, &pairs, &rows), regress(network, &moved, &rows));
+            here.iter().zip(&there).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+        };
+        let corrected = NetworkRegressor { definition: Definition::Corrected, ..open() };
+        assert!(difference(&corrected) < 1e-4, "{}", difference(&corrected));
+        assert!(difference(&open()) > 1e-2, "the released one does not: {}", difference(&open()));
+    }
+
+    #[test]
+    fn descriptors_of_another_length_are_refused() {
+        let network = NetworkRegressor::open(&golden("weights.safetensors")).unwrap();
+        let pose = Pose::identity();
+        let anchors = vec![Anchor { pose: &pose, descriptor: &[1.0, 2.0] }];
+        let requests = [Request { target: 0, pose, anchors }];
+        let err = network.regress(&requests, &mut [0.0; 2]).unwrap_err().to_string();
+        assert!(err.contains("expected 32, got 2"), "{err}");
+    }
+}

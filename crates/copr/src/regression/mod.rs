@@ -104,7 +104,7 @@ fn combine(
 
 /// The one place where a regressed value becomes f32.
 #[expect(clippy::cast_possible_truncation, reason = "descriptors are f32")]
-fn narrow(value: f64) -> f32 {
+pub(crate) fn narrow(value: f64) -> f32 {
     value as f32
 }
 

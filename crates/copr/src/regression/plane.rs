@@ -101,7 +101,7 @@ impl PlaneFit {
     }
 
     fn by_decomposition(&self, request: &Request<'_>) -> Result<(Vec<f64>, Told)> {
-        let n = request.anchors.len();
+        let (target, n) = (request.target, request.anchors.len());
         let positions: Vec<Vector3<f64>> =
             request.anchors.iter().map(|it| it.pose.translation.vector).collect();
         let at = request.pose.translation.vector;

@@ -45,8 +45,8 @@ fn on_real_poses(
     plan: Plan<'_>,
     context: Context<'_>,
 ) -> Result<()> {
-    let row = |map, definition, note: Option<&str>| Row {
-        map,
+    let row = |map: &str, definition, note: Option<&str>| Row {
+        map: map.to_owned(),
         column: &scene.name,
         provenance: Provenance::Measured,
         of: "",
@@ -86,8 +86,8 @@ fn in_rooms(table: &mut Table, scene: &Scene, plan: Plan<'_>, context: Context<'
     for encoder in &plan.rooms.encoders {
         for &paths in &plan.rooms.paths {
             let of = Rooms::label(encoder, paths);
-            let row = |map, definition, note| Row {
-                map,
+            let row = |map: &str, definition, note| Row {
+                map: map.to_owned(),
                 column: &scene.name,
                 provenance: Provenance::Generated,
                 of: &of,

@@ -36,7 +36,7 @@ pub(super) fn run(
                     }
                     Err(why) => {
                         let one = Row {
-                            map: "sparse map",
+                            map: "sparse map".to_owned(),
                             column: &scene.name,
                             provenance: Provenance::Generated,
                             of: &of,
@@ -59,8 +59,8 @@ fn on_real_poses(
     every: usize,
     context: Context<'_>,
 ) -> Result<()> {
-    let row = |map| Row {
-        map,
+    let row = |map: &str| Row {
+        map: map.to_owned(),
         column: &scene.name,
         provenance: Provenance::Measured,
         of: "",
@@ -94,13 +94,8 @@ struct OneRoom<'a> {
 }
 
 impl OneRoom<'_> {
-    fn row<'r>(
-        &'r self,
-        map: &'r str,
-        definition: Option<&'static str>,
-        note: Option<String>,
-    ) -> Row<'r> {
-        let (column, of) = (&self.scene.name, self.of);
+    fn row(&self, map: &str, definition: Option<&'static str>, note: Option<String>) -> Row<'_> {
+        let (map, column, of) = (map.to_owned(), &self.scene.name, self.of);
         Row { map, column, provenance: Provenance::Generated, of, definition, note }
     }
 

@@ -22,8 +22,8 @@ pub(super) fn run(
 ) -> Result<()> {
     for place in places {
         let of = format!("{}, generated", place.encoder);
-        let row = |map, definition, note| Row {
-            map,
+        let row = |map: &str, definition, note| Row {
+            map: map.to_owned(),
             column: &place.name,
             provenance: Provenance::Generated,
             of: &of,

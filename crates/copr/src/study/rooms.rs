@@ -138,14 +138,14 @@ impl Rooms {
         let none = || CoreError::Empty("images of a generated room");
         let dataset = sources.images(&id)?.ok_or_else(none)?;
         let (query_poses, poses) = dataset.poses.clone().ok_or_else(none)?;
-        let describe = |images: &[PathBuf], poses, n_sequences| {
+        let describe = |images: &[PathBuf], poses, n_sequences| -> Result<Side> {
             let what = format!("{encoder} on {}", scene.name);
             let rows = context.sources.features(&runner, images, &what)?.into_descriptors();
             let reason = "gives no descriptors of one length: choose another";
             let (name, value) = ("encoders", encoder.to_owned());
             let rows = rows.ok_or(CoreError::Parameter { name, value, reason })?;
             let sequences = even(rows.len(), n_sequences);
-            Result::Ok(Side { map: Map::new(rows, poses)?, sequences })
+            Ok(Side { map: Map::new(rows, poses)?, sequences })
         };
         let queries = describe(&dataset.queries, query_poses, scene.queries.len())?;
         let references = describe(&dataset.references, poses, scene.references.len())?;

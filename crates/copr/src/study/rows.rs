@@ -21,7 +21,7 @@ const GAIN: &str = "MTE minus that of the sparse map, m";
 /// Which map was searched: what the rows of a scene are about.
 pub(super) struct Row<'a> {
     /// The map, such as `sparse map`.
-    pub(super) map: &'a str,
+    pub(super) map: String,
     /// The scene.
     pub(super) column: &'a str,
     /// Where the numbers come from.

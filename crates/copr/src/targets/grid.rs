@@ -41,7 +41,7 @@ impl Grid {
     pub(super) fn offsets(&self) -> Result<[Vec<f64>; 2]> {
         let n = self.span_m.map(|span| count(span / self.step_m));
         check_count(u128::from(n[0]).max(u128::from(n[1])))?;
-        let axis = |span| match self.definition {
+        let axis = |span: f64| match self.definition {
             Definition::Published => arange(-span / 2.0, span / 2.0, self.step_m),
             Definition::Corrected => symmetric(span, self.step_m),
         };
