@@ -107,7 +107,7 @@ pub fn regress(
 /// their order; each says from which of them it is regressed. The writer may have more rows than
 /// `map` by then, but not fewer.
 ///
-/// Regressed rows are called `regressed-0000000`, … by the number of their target if `named`, which
+/// Regressed rows are called `regressed-0000000`, … by the number of their target if `with_names`, which
 /// the rows before them must be too.
 ///
 /// # Errors
@@ -118,7 +118,7 @@ pub fn densify(
     targets: &Targets<'_>,
     regressor: &dyn Regressor,
     options: Options,
-    named: bool,
+    with_names: bool,
     writer: &mut MapWriter,
 ) -> Result<Told> {
     regress(map, targets, regressor, options, |piece| {
@@ -127,7 +127,7 @@ pub fn densify(
             origins.push_regressed(anchors)?;
         }
         let end = piece.first + piece.poses.len();
-        let names: Option<Names> = named
+        let names: Option<Names> = with_names
             .then(|| (piece.first..end).map(|target| format!("regressed-{target:07}")).collect());
         let poses = Poses::SixDof(piece.poses.to_vec());
         writer.append_regressed(piece.descriptors, Some(&poses), names.as_ref(), &origins)?;
@@ -163,7 +163,9 @@ pub fn regressed(
 fn normalize(row: &mut [f32]) {
     let norm = row.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt();
     if norm > 0.0 {
-        row.iter_mut().for_each(|x| *x = crate::regression::narrow(f64::from(*x) / norm));
+        for x in row {
+            *x = crate::regression::narrow(f64::from(*x) / norm);
+        }
     }
 }
 

@@ -5,7 +5,7 @@
 //! an image:
 //!
 //! ```
-//! use copr::{Anchors, LinearInterpolation, Options, PoseErrors, Targets, oracle, regressed};
+//! use copr::{Anchors, LinearInterpolation, Options, PoseErrors, Targets, oracle, regressed, sequences};
 //! use ndarray::array;
 //! use vpr_core::{Descriptors, Map, Pose, Poses, retrieve};
 //!
@@ -14,7 +14,7 @@
 //! let rows = Descriptors::new(array![[1.0, 0.0], [0.5, 0.5], [0.0, 1.0]])?;
 //! let sparse = Map::new(rows, Poses::SixDof(poses.clone()))?;
 //!
-//! let anchors = Anchors::every(&poses, &[0..3], 1)?;
+//! let anchors = Anchors::every(&poses, &sequences(None, 3), 1)?;
 //! let targets = Targets::between(&anchors, 3)?; // every metre
 //! let (dense, _) = regressed(&sparse, &targets, &LinearInterpolation, Options::default())?;
 //!

@@ -1,6 +1,10 @@
 //! `copr train`: the regression network H on descriptors of a frozen encoder.
 
-use std::path::{Path, PathBuf};
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+    slice,
+};
 
 use anyhow::{bail, ensure};
 use clap::Subcommand;
@@ -206,8 +210,9 @@ impl RegressorArgs {
             if self.held_out {
                 for rows in &room.queries.sequences {
                     let middle = usize::midpoint(rows.start, rows.end);
-                    training.add(&room.queries.map, &[rows.start..middle])?;
-                    validation.add(&room.queries.map, &[middle..rows.end])?;
+                    let halves = (rows.start..middle, middle..rows.end);
+                    training.add(&room.queries.map, slice::from_ref(&halves.0))?;
+                    validation.add(&room.queries.map, slice::from_ref(&halves.1))?;
                 }
             } else {
                 training.add(&room.queries.map, &room.queries.sequences)?;
@@ -227,11 +232,11 @@ impl RegressorArgs {
 struct Joined {
     values: Vec<f32>,
     poses: Vec<vpr_core::Pose>,
-    sequences: Vec<std::ops::Range<usize>>,
+    sequences: Vec<Range<usize>>,
 }
 
 impl Joined {
-    fn add(&mut self, map: &Map, sequences: &[std::ops::Range<usize>]) -> anyhow::Result<()> {
+    fn add(&mut self, map: &Map, sequences: &[Range<usize>]) -> anyhow::Result<()> {
         let poses = map.poses().six_dof()?;
         for rows in sequences {
             let start = self.poses.len();

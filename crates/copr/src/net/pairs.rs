@@ -14,7 +14,7 @@ use crate::Result;
 #[derive(Clone, Debug)]
 pub struct Pairs {
     map: Map,
-    pairs: Vec<(usize, usize)>,
+    list: Vec<(usize, usize)>,
     definition: Definition,
 }
 
@@ -79,19 +79,19 @@ impl Pairs {
             return Err(CoreError::OutOfRange { what: "row of a pair", index, len }.into());
         }
         map.poses().six_dof()?;
-        Ok(Self { map, pairs, definition })
+        Ok(Self { map, list: pairs, definition })
     }
 
     /// Number of pairs.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.pairs.len()
+        self.list.len()
     }
 
     /// Whether there is no pair; there always is one.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.pairs.is_empty()
+        self.list.is_empty()
     }
 
     /// Length of a descriptor.
@@ -103,7 +103,7 @@ impl Pairs {
     /// Rows of the map: anchor and target of every pair.
     #[must_use]
     pub fn list(&self) -> &[(usize, usize)] {
-        &self.pairs
+        &self.list
     }
 
     /// Stands for descriptors, poses and pairs.
@@ -115,7 +115,7 @@ impl Pairs {
             let parts = it.translation.vector.iter().chain(it.rotation.coords.iter()).copied();
             parts.flat_map(f64::to_le_bytes).collect::<Vec<u8>>()
         });
-        let rows = self.pairs.iter().flat_map(|&(a, b)| [a as u64, b as u64]);
+        let rows = self.list.iter().flat_map(|&(a, b)| [a as u64, b as u64]);
         let bytes: Vec<u8> = values.chain(poses).chain(rows.flat_map(u64::to_le_bytes)).collect();
         BlockDigest::of(&bytes).to_hex()
     }
@@ -155,7 +155,7 @@ impl Pairs {
         let mut batch = PairBatch { n: numbers.len(), ..PairBatch::default() };
         batch.relative.reserve(RELATIVE_POSE * numbers.len());
         for &number in numbers {
-            let (anchor, target) = self.pairs[number];
+            let (anchor, target) = self.list[number];
             batch.anchors.extend(self.map.descriptors().row(anchor));
             batch.targets.extend(self.map.descriptors().row(target));
             let relative = relative_pose(&poses[anchor], &poses[target], self.definition);
@@ -171,6 +171,7 @@ mod tests {
     use vpr_core::{Descriptors, Pose, Poses};
 
     use super::*;
+    use crate::sequences;
 
     fn pairs(n: usize, sequences: &[Range<usize>], k: usize) -> Result<Pairs> {
         let rows = Array2::from_shape_fn((n, 2), |(row, column)| (row * 2 + column) as f32);
@@ -183,9 +184,9 @@ mod tests {
     fn an_anchor_goes_with_those_that_follow_it_up_to_the_next() {
         let found = pairs(9, &[0..5, 5..9], 3).unwrap();
         assert_eq!(found.list(), [(0, 1), (0, 2), (3, 4), (5, 6), (5, 7)]);
-        assert!(pairs(9, &[0..5], 1).is_err());
+        assert!(pairs(9, &sequences(None, 5), 1).is_err());
         assert!(pairs(9, &[0..1, 1..2], 3).is_err());
-        assert!(pairs(4, &[0..5], 3).is_err());
+        assert!(pairs(4, &sequences(None, 5), 3).is_err());
     }
 
     #[test]
@@ -206,7 +207,7 @@ mod tests {
 
     #[test]
     fn a_pass_sees_every_pair_at_most_once_and_no_half_batch() {
-        let found = pairs(8, &[0..8], 8).unwrap();
+        let found = pairs(8, &sequences(None, 8), 8).unwrap();
         assert_eq!(found.len(), 7);
         let pass = |number: usize| -> Vec<f32> {
             let steps = 3 * number..3 * number + 3;

@@ -262,6 +262,7 @@ mod tests {
     use vpr_core::{Descriptors, Map, Pose, Poses};
 
     use super::*;
+    use crate::sequences;
 
     /// Descriptors that turn with the position along a line.
     fn pairs(n: usize, shift: f64) -> Pairs {
@@ -271,7 +272,7 @@ mod tests {
         });
         let poses = (0..n).map(|row| Pose::translation(at(row), 0.0, 0.0)).collect();
         let map = Map::new(Descriptors::new(rows).unwrap(), Poses::SixDof(poses)).unwrap();
-        Pairs::following(map, &[0..n], 5, Definition::Corrected).unwrap()
+        Pairs::following(map, &sequences(None, n), 5, Definition::Corrected).unwrap()
     }
 
     fn settings() -> Training {

@@ -23,7 +23,7 @@ pub enum Outside {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlaneParams {
-    /// [`Definition::Published`] inverts XᵀX over `[x y z 1]` of the anchors before, at and after
+    /// [`Definition::Published`] inverts `XᵀX` over `[x y z 1]` of the anchors before, at and after
     /// its own along the sequence (C-5); [`Definition::Corrected`] takes the nearest in space and a
     /// singular value decomposition around their mean.
     pub definition: Definition,
@@ -117,7 +117,7 @@ impl PlaneFit {
             return Err(Error::Singular { target });
         };
         let greatest = svd.singular_values.max();
-        let size = positions.iter().map(|it| it.norm()).fold(at.norm(), f64::max);
+        let size = positions.iter().map(Vector3::norm).fold(at.norm(), f64::max);
         // What rounding of coordinates leaves of anchors at one place.
         let nothing = 1e-12 * size.max(1.0);
         let offset = at - mean;

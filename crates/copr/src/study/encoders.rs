@@ -9,7 +9,7 @@ use super::{
     Context, Method, Paths, Rooms, Scene,
     dense::{densified, localize, selected},
 };
-use crate::{Anchors, Grid, PoseErrors, Result, Targets};
+use crate::{Anchors, Grid, PoseErrors, Result, Targets, sequences};
 
 /// Row of means over scenes.
 const AVERAGE: &str = "Average";
@@ -34,7 +34,9 @@ pub(super) fn run(
         }
     }
     for paths in &rooms.paths {
-        columns.iter().for_each(|column| average(table, scenes, column, *paths));
+        for column in &columns {
+            average(table, scenes, column, *paths);
+        }
     }
     Ok(())
 }
@@ -71,11 +73,8 @@ fn one(
     let queries = &room.queries.map;
     let sparse = selected(&room.references.map, &room.kept.clone().collect::<Vec<_>>())?;
     push("sparse map", &localize(&sparse, queries)?)?;
-    let anchors = Anchors::every(
-        sparse.poses().six_dof()?,
-        std::slice::from_ref(&(0..sparse.len())),
-        rooms.every,
-    )?;
+    let anchors =
+        Anchors::every(sparse.poses().six_dof()?, &sequences(None, sparse.len()), rooms.every)?;
     let grid = Grid::new(scene.span_m, step_m, Definition::Corrected)?;
     let targets = Targets::around(&anchors, &grid)?;
     let dense = match network.ready(context)? {

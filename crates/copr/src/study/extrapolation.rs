@@ -4,12 +4,9 @@ use vpr_core::{Definition, Pose, Poses, Provenance};
 use vpr_report::table::Table;
 
 use super::{
-    Context, Method, Rooms, Scene,
-    dense::{densified, localize, remark, selected},
-    real::RealScene,
-    rows::Row,
+    Context, Method, Rooms, Scene, dense::selected, methods::Setting, real::RealScene, rows::Row,
 };
-use crate::{Anchors, Grid, PoseErrors, Result, Targets, oracle};
+use crate::{Anchors, Grid, PoseErrors, Result, Targets, oracle, sequences};
 
 /// How targets are placed.
 #[derive(Clone, Copy)]
@@ -76,7 +73,7 @@ fn on_real_poses(
 
 /// One sequence and the grids around every so many-th of its images.
 fn dense_poses(sequence: &[Pose], every: usize, grid: &Grid) -> Result<Poses> {
-    let anchors = Anchors::every(sequence, std::slice::from_ref(&(0..sequence.len())), every)?;
+    let anchors = Anchors::every(sequence, &sequences(None, sequence.len()), every)?;
     let targets = Targets::around(&anchors, grid)?;
     let all = sequence.iter().copied().chain(targets.iter().map(|it| it.pose));
     Ok(Poses::SixDof(all.collect()))
@@ -102,37 +99,20 @@ fn in_rooms(table: &mut Table, scene: &Scene, plan: Plan<'_>, context: Context<'
                 }
             };
             let sparse = selected(&room.references.map, &room.kept.clone().collect::<Vec<_>>())?;
-            let queries = &room.queries.map;
-            let sparse_errors = localize(&sparse, queries)?;
-            let anchors =
-                Anchors::every(sparse.poses().six_dof()?, &[0..sparse.len()], plan.rooms.every)?;
+            let anchors = Anchors::every(
+                sparse.poses().six_dof()?,
+                &sequences(None, sparse.len()),
+                plan.rooms.every,
+            )?;
             let grid = Grid::new(scene.span_m, plan.step_m, Definition::Corrected)?;
             let targets = Targets::around(&anchors, &grid)?;
-            let mut dense = sparse.poses().clone();
-            dense.extend(&Poses::SixDof(targets.iter().map(|it| it.pose).collect()))?;
-            let best = oracle(queries.poses(), &dense)?;
-            let errors = PoseErrors::of_retrieval(&best, &dense, queries.poses())?;
-            row("dense map, oracle", None, None).push_errors(table, &errors, context)?;
-            row("sparse map", None, None).push_errors(table, &sparse_errors, context)?;
-            for method in plan.methods {
-                let map = method.map();
-                let ready = match method.ready(context)? {
-                    Ok(ready) => ready,
-                    Err(why) => {
-                        row(&map, None, None).push_absent(table, &why);
-                        continue;
-                    }
-                };
-                match densified(&sparse, &sparse, &targets, &ready)? {
-                    Ok((dense, told)) => {
-                        let errors = localize(&dense, queries)?;
-                        let row = row(&ready.map, ready.definition, remark(told));
-                        row.push_errors(table, &errors, context)?;
-                        row.push_gain(table, &errors, &sparse_errors, context)?;
-                    }
-                    Err(why) => row(&map, ready.definition, None).push_absent(table, &why),
-                }
-            }
+            let (queries, targets) = (&room.queries.map, &targets);
+            Setting { sparse: &sparse, queries, targets }.push(
+                table,
+                plan.methods,
+                row,
+                context,
+            )?;
         }
     }
     Ok(())

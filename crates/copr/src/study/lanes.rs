@@ -1,18 +1,19 @@
 //! The other lane of a street or an escalator: table 6.2.
 
 use nalgebra::Vector3;
-use vpr_core::{Error as CoreError, Map, Poses, Provenance};
+use vpr_core::{Error as CoreError, Map, Provenance};
 use vpr_report::table::Table;
 use vpr_study::{Runner, technique::Found};
 use vpr_worlds::{Side, World, named_recipe};
 
 use super::{
     Context, Method, Place,
-    dense::{densified, joined, localize, remark},
+    dense::{joined, localize},
+    methods::Setting,
     place::Aside,
     rows::Row,
 };
-use crate::{Anchors, Frame, PoseErrors, Result, Targets, oracle};
+use crate::{Anchors, Frame, Result, Targets, sequences};
 
 pub(super) fn run(
     table: &mut Table,
@@ -22,7 +23,7 @@ pub(super) fn run(
 ) -> Result<()> {
     for place in places {
         let of = format!("{}, generated", place.encoder);
-        let row = |map: &str, definition, note| Row {
+        let row = |map: &str, definition, note: Option<String>| Row {
             map: map.to_owned(),
             column: &place.name,
             provenance: Provenance::Generated,
@@ -40,7 +41,7 @@ pub(super) fn run(
         let opened = Opened::new(place, &runner, context)?;
         let (sparse, queries) = (&opened.references, &opened.queries);
         let poses = sparse.poses().six_dof()?;
-        let anchors = Anchors::every(poses, &[0..poses.len()], 1)?;
+        let anchors = Anchors::every(poses, &sequences(None, poses.len()), 1)?;
         let targets = match place.targets {
             Aside::Lane([x, y, z]) => {
                 Targets::lane(&anchors, Vector3::new(x, y, z), Frame::Camera)?
@@ -50,37 +51,13 @@ pub(super) fn run(
                 Targets::listed(&anchors, views.poses().six_dof()?)?
             }
         };
-        let sparse_errors = localize(sparse, queries)?;
-        let mut dense = sparse.poses().clone();
-        dense.extend(&Poses::SixDof(targets.iter().map(|it| it.pose).collect()))?;
-        let best = oracle(queries.poses(), &dense)?;
-        let errors = PoseErrors::of_retrieval(&best, &dense, queries.poses())?;
-        row("dense map, oracle", None, None).push_errors(table, &errors, context)?;
-        row("sparse map", None, None).push_errors(table, &sparse_errors, context)?;
+        let setting = Setting { sparse, queries, targets: &targets };
+        let sparse_errors = setting.push(table, methods, &row, context)?;
         if let (Aside::Views {}, Some(views)) = (place.targets, &opened.views) {
             let errors = localize(&joined(sparse, views)?, queries)?;
             let row = row("dense map, 3D Model", None, None);
             row.push_errors(table, &errors, context)?;
             row.push_gain(table, &errors, &sparse_errors, context)?;
-        }
-        for method in methods {
-            let map = method.map();
-            let ready = match method.ready(context)? {
-                Ok(ready) => ready,
-                Err(why) => {
-                    row(&map, None, None).push_absent(table, &why);
-                    continue;
-                }
-            };
-            match densified(sparse, sparse, &targets, &ready)? {
-                Ok((dense, told)) => {
-                    let errors = localize(&dense, queries)?;
-                    let row = row(&map, ready.definition, remark(told));
-                    row.push_errors(table, &errors, context)?;
-                    row.push_gain(table, &errors, &sparse_errors, context)?;
-                }
-                Err(why) => row(&map, ready.definition, None).push_absent(table, &why),
-            }
         }
     }
     Ok(())

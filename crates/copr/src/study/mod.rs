@@ -5,6 +5,7 @@ mod encoders;
 mod extrapolation;
 mod interpolation;
 mod lanes;
+mod methods;
 mod place;
 mod real;
 mod rooms;

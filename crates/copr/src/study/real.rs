@@ -69,10 +69,10 @@ fn read(path: &PathBuf) -> Result<Path6> {
     let mut rows: Vec<(&str, Pose)> = names.iter().zip(poses.six_dof()?.iter().copied()).collect();
     rows.sort_by(|a, b| a.0.cmp(b.0));
     let names: Names = rows.iter().map(|row| row.0).collect();
-    let named = |rows: Range<usize>| {
+    let with_name = |rows: Range<usize>| {
         let name = names.get(rows.start).unwrap_or_default();
         (name.split('/').next().unwrap_or_default().to_owned(), rows)
     };
-    let sequences = sequences(Some(&names), names.len()).into_iter().map(named).collect();
+    let sequences = sequences(Some(&names), names.len()).into_iter().map(with_name).collect();
     Ok(Path6 { poses: rows.iter().map(|row| row.1).collect(), sequences })
 }

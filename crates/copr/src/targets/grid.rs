@@ -50,10 +50,10 @@ impl Grid {
 }
 
 /// As `numpy.arange` computes it, then rounded to five decimals.
-fn arange(start: f64, stop: f64, step: f64) -> Vec<f64> {
+fn arange(start: f64, end: f64, step: f64) -> Vec<f64> {
     // NumPy takes the step from its first two values.
     let delta = (start + step) - start;
-    (0..count((stop - start) / step))
+    (0..count((end - start) / step))
         .map(|at| ((start + at as f64 * delta) * 1e5).round_ties_even() / 1e5)
         .collect()
 }

@@ -235,6 +235,7 @@ mod tests {
     use vpr_core::Definition;
 
     use super::*;
+    use crate::sequences;
 
     fn anchors(poses: &[Pose]) -> Anchors {
         Anchors::of_rows(poses, &[(0..poses.len()).collect()]).unwrap()
@@ -299,7 +300,7 @@ mod tests {
     #[test]
     fn frames_belong_to_the_anchor_before_them_and_listed_poses_to_the_nearest() {
         let poses: Vec<Pose> = (0..9).map(|x| at(f64::from(x), 0.0, 0.0)).collect();
-        let anchors = Anchors::every(&poses, &[0..9], 4).unwrap();
+        let anchors = Anchors::every(&poses, &sequences(None, 9), 4).unwrap();
         let targets = Targets::frames(&anchors, &poses, &[1, 3, 5, 8]).unwrap();
         assert_eq!(targets.iter().map(|it| it.home).collect::<Vec<_>>(), [0, 0, 1, 1]);
         let listed = Targets::listed(&anchors, &[at(3.0, 1.0, 0.0), at(-9.0, 0.0, 0.0)]).unwrap();
