@@ -238,7 +238,7 @@ mod tests {
         let map = map();
         let poses = map.poses().six_dof().unwrap();
         let anchors = Anchors::of_rows(poses, &[vec![0, 1], vec![2]]).unwrap();
-        let targets = Targets::frames(&anchors, poses, &[0, 1]).unwrap();
+        let targets = Targets::frames(&anchors, poses, &[0, 2]).unwrap();
         let options = Options { batch: 1, ..Options::default() };
         let err = regressed(&map, &targets, &LinearInterpolation, options).unwrap_err();
         assert!(err.to_string().starts_with("target 1: linear interpolation needs 2"), "{err}");

@@ -6,7 +6,7 @@ use std::{
 };
 
 use burn::{
-    module::{Module, ModuleMapper, Param},
+    module::Module,
     tensor::{Device, Tensor, TensorData},
 };
 use vpr_core::{Definition, Error as CoreError};
@@ -158,7 +158,7 @@ pub fn train(
             format!("{loss:.5}"),
         ])
     };
-    run.descend(&descent, fresh.map(&mut WithoutBiases), batch, cells)?;
+    run.descend(&descent, fresh, batch, cells)?;
     let (step, loss, path) =
         best(folder)?.ok_or_else(|| CoreError::format(folder, "best network", "is not there"))?;
     let mut network = config.init(&Device::flex());
@@ -200,21 +200,6 @@ impl Learner for Pupil {
 
     fn learn(&self, batch: PairBatch, device: &Device) -> Tensor<1> {
         loss(&self.network, batch, device)
-    }
-}
-
-/// Biases begin at zero: drawn ones would not depend on the seed.
-struct WithoutBiases;
-
-impl ModuleMapper for WithoutBiases {
-    fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        if D > 1 {
-            return param;
-        }
-        param.map(|old| {
-            let tracked = old.is_require_grad();
-            old.detach().zeros_like().set_require_grad(tracked)
-        })
     }
 }
 
