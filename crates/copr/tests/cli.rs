@@ -193,11 +193,13 @@ fn the_oracle_needs_poses_only() {
     let world = World::new();
     let list = "a 1 0 0 0 -4.1 0.0 0.0\nb 1 0 0 0 -23 0 0\n";
     std::fs::write(world.path("poses.txt"), list).unwrap();
-    let (out, err) = world.ok("localize --map sparse.safetensors --queries poses.txt --oracle");
+    let localize =
+        "localize --map sparse.safetensors --queries poses.txt --queries-format hloc-poses";
+    let (out, err) = world.ok(&format!("{localize} --oracle"));
     let lines: Vec<&str> = out.lines().collect();
     assert!(lines[2].starts_with("b,seq-02/frame-000003.color.png,measured,,23,"), "{out}");
     assert!(err.contains("2 queries"), "{err}");
-    let err = world.refused("localize --map sparse.safetensors --queries poses.txt");
+    let err = world.refused(localize);
     assert!(err.contains("poses.txt: has no descriptors"), "{err}");
 }
 

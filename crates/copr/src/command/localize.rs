@@ -1,6 +1,9 @@
 //! `copr localize`: where queries were taken.
 
-use std::{fmt::Write as _, path::PathBuf};
+use std::{
+    fmt::Write as _,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{bail, ensure};
 use copr::{PoseErrors, WITHIN, oracle};
@@ -23,9 +26,15 @@ pub(crate) struct LocalizeArgs {
     /// Descriptors of the queries, perhaps with poses; with --oracle poses are enough
     #[arg(long, value_name = "PATH")]
     queries: PathBuf,
+    /// Its format, if its name does not say it
+    #[arg(long, value_name = "FORMAT")]
+    queries_format: Option<Format>,
     /// Poses of the queries, if their descriptors did not come with them: errors are printed too
     #[arg(long, value_name = "PATH")]
     query_poses: Option<PathBuf>,
+    /// Its format, if its name does not say it
+    #[arg(long, value_name = "FORMAT")]
+    query_poses_format: Option<Format>,
     /// Leave out rows that were regressed
     #[arg(long)]
     measured: bool,
@@ -42,9 +51,9 @@ pub(crate) fn run(args: &LocalizeArgs) -> anyhow::Result<Outcome> {
     let none = || Error::Empty("poses").in_file(&args.map);
     let poses = map.poses()?.ok_or_else(none)?;
     poses.six_dof().map_err(|err| err.in_file(&args.map))?;
-    let mut queries = exchange::read(Format::guess(&args.queries)?, &args.queries)?;
+    let mut queries = read(args.queries_format, &args.queries)?;
     if let Some(path) = &args.query_poses {
-        let more = exchange::read(Format::guess(path)?, path)?;
+        let more = read(args.query_poses_format, path)?;
         queries = queries.join(more).map_err(|err| err.in_file(path))?;
     }
     let origins = map.origins()?;
@@ -72,6 +81,12 @@ pub(crate) fn run(args: &LocalizeArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
+/// A file in the format that was named, or in the one that its name shows.
+fn read(format: Option<Format>, path: &Path) -> anyhow::Result<Parts> {
+    let format = format.map_or_else(|| Format::guess(path), Ok)?;
+    Ok(exchange::read(format, path)?)
+}
+
 /// The best reference of every query, and how far its descriptor is.
 struct Found {
     best: Vec<usize>,
@@ -82,7 +97,7 @@ fn by_descriptor(
     queries: &Parts,
     map: &OpenMap,
     rows: Option<Vec<usize>>,
-    path: &std::path::Path,
+    path: &Path,
 ) -> anyhow::Result<Found> {
     let Some(descriptors) = &queries.descriptors else {
         bail!("{}: has no descriptors", path.display())
@@ -106,7 +121,7 @@ fn by_pose(
     queries: &Parts,
     poses: &Poses,
     rows: Option<Vec<usize>>,
-    path: &std::path::Path,
+    path: &Path,
 ) -> anyhow::Result<Found> {
     let Some(truth) = &queries.poses else {
         bail!("{}: `--oracle` needs poses of the queries", path.display())
