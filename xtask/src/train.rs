@@ -29,6 +29,8 @@ enum Network {
     Btl,
     /// `data/models/stun-default.safetensors`
     Stun,
+    /// `data/models/copr-default.safetensors`
+    CoprRegressor,
 }
 
 /// Runs the program and passes its exit code on.
@@ -37,6 +39,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Network::DefaultEncoder => ("default-encoder", &["train"]),
         Network::Btl => ("sue", &["train", "btl"]),
         Network::Stun => ("sue", &["train", "stun"]),
+        Network::CoprRegressor => {
+            ("copr", &["train", "regressor", "--experiment", "experiments/table-6.1.toml"])
+        }
     };
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(cargo)

@@ -13,7 +13,7 @@ use std::{
 use serde_json::Value;
 
 /// Every package with those of the workspace that it may depend on; dependencies of tests aside.
-const ARROWS: [(&str, &[&str]); 12] = [
+const ARROWS: [(&str, &[&str]); 13] = [
     ("vpr-files", &[]),
     ("vpr-core", &["vpr-files"]),
     ("vpr-data", &["vpr-core", "vpr-files"]),
@@ -39,6 +39,7 @@ const ARROWS: [(&str, &[&str]); 12] = [
     ),
     ("vpr-bench", CHAPTER),
     ("vpr-sue", CHAPTER),
+    ("vpr-copr", CHAPTER),
     ("xtask", &[]),
 ];
 
@@ -56,7 +57,7 @@ const CHAPTER: &[&str] = &[
 
 /// Packages that only some may name.
 const RESERVED: [(&str, &[&str]); 4] = [
-    ("burn", &["vpr-nets", "vpr-sue"]),
+    ("burn", &["vpr-nets", "vpr-sue", "vpr-copr"]),
     ("kornia-image", &["vpr-vision"]),
     ("kornia-imgproc", &["vpr-vision"]),
     ("hdf5-pure", &["vpr-data"]),

@@ -108,3 +108,43 @@ fn segments_merge_and_formats_convert() {
     let missing = bench(folder, "convert refs.h5 poses.tum").code(2);
     assert_eq!(stderr(&missing), "error: refs.h5: content: no poses in the file\n");
 }
+
+#[test]
+fn regressed_rows_are_told_and_can_be_left_out() {
+    use vpr_core::map::{About, MapWriter, Names, OpenMap, Opening, Origin, Origins, RowType};
+
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    references(folder);
+    let rows = Array2::from_shape_fn((4, 3), |(row, column)| (row * (column + 1)) as f32);
+    let path = folder.join("dense.safetensors");
+    let mut writer = MapWriter::create(&path, 3, RowType::F32, About::default()).unwrap();
+    let names = |all: [&str; 2]| all.into_iter().collect::<Names>();
+    writer.append(rows.slice(ndarray::s![..2, ..]), None, Some(&names(["a", "b"]))).unwrap();
+    let mut origins = Origins::default();
+    origins.push_regressed(&[0, 1]).unwrap();
+    origins.push_regressed(&[1]).unwrap();
+    let more = names(["r0", "r1"]);
+    let two = rows.slice(ndarray::s![2.., ..]);
+    writer.append_regressed(two, None, Some(&more), &origins).unwrap();
+    writer.finish().unwrap();
+
+    let info = stdout(&bench(folder, "info dense.safetensors").success());
+    assert!(info.contains("references: 4\n") && info.contains("regressed: 2\n"), "{info}");
+    let search = "search dense.safetensors --queries queries.npy -k 1";
+    let found = stdout(&bench(folder, search).success());
+    assert!(found.contains("\n3,1,r1,"), "{found}");
+    let found = stdout(&bench(folder, &format!("{search} --measured")).success());
+    assert!(
+        found.contains("\n3,1,b,") && !found.contains(",r0,") && !found.contains(",r1,"),
+        "{found}"
+    );
+
+    bench(folder, "convert dense.safetensors half.safetensors --row-type f16").success();
+    let half = OpenMap::open(&folder.join("half.safetensors"), Opening::default()).unwrap();
+    let kept = half.origins().unwrap().unwrap();
+    assert_eq!(kept.get(2), Some(Origin::Regressed(&[0, 1])));
+    let told = bench(folder, "convert dense.safetensors dense.npz").success();
+    assert!(stderr(&told).contains("2 of them are"), "{}", stderr(&told));
+    bench(folder, "verify dense.safetensors").success();
+}

@@ -136,6 +136,39 @@ fn every_query_gets_an_uncertainty_in_three_formats() {
     assert_eq!(values[(3, 0)], uncertainty);
 }
 
+/// Regressed rows that lie between the queries and their references in every respect.
+#[test]
+fn references_that_were_regressed_can_be_left_out() {
+    use vpr_core::map::{MapWriter, Origins, RowType};
+
+    let world = World::new();
+    let about = || About { encoder: Some("toy".to_owned()), ..About::default() };
+    let mut writer =
+        MapWriter::create(&world.path("dense.safetensors"), 4, RowType::F32, about()).unwrap();
+    let names = |prefix: &str| (0..N).map(|i| format!("{prefix}-{i}")).collect::<Names>();
+    let here = Poses::Planar(positions(N, 0.0));
+    let measured = descriptors(N, 0.0);
+    writer.append(measured.view(), Some(&here), Some(&names("map.safetensors"))).unwrap();
+    let mut origins = Origins::default();
+    (0..N).for_each(|row| origins.push_regressed(&[row]).unwrap());
+    let between = Poses::Planar(positions(N, 1.5));
+    let rows = descriptors(N, 0.05);
+    let names = names("regressed");
+    writer.append_regressed(rows.view(), Some(&between), Some(&names), &origins).unwrap();
+    writer.finish().unwrap();
+    for estimator in ["sue", "sue-density", "l2"] {
+        let of = |map: &str, more: &[&str]| {
+            let head = ["estimate", "--map", map, "--queries", "queries.safetensors", "-k", "3"];
+            let words = [&head[..], &["--lambda", "20", "--estimator", estimator], more].concat();
+            success(&world.run(&words))
+        };
+        let sparse = of("map.safetensors", &[]);
+        assert_eq!(of("dense.safetensors", &["--measured"]), sparse);
+        let dense = of("dense.safetensors", &[]);
+        assert!(dense.contains(",regressed-0,"), "{dense}");
+    }
+}
+
 #[test]
 fn batches_and_threads_change_nothing() {
     let world = World::new();

@@ -38,7 +38,7 @@ fn names() -> Names {
 
 fn parts() -> Parts {
     let poses = Some(poses());
-    Parts { names: Some(names()), descriptors: Some(descriptors()), poses, about: About::default() }
+    Parts { names: Some(names()), descriptors: Some(descriptors()), poses, ..Parts::default() }
 }
 
 /// Writes and reads again.

@@ -73,6 +73,12 @@ impl<'a> Sources<'a> {
         self.datasets.roots()
     }
 
+    /// The folder that keeps what is rendered or takes long.
+    #[must_use]
+    pub fn cache(&self) -> &Path {
+        self.datasets.cache()
+    }
+
     /// What is kept on disk.
     #[must_use]
     pub fn store(&self) -> &Store {

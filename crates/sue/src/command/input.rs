@@ -6,8 +6,8 @@ use anyhow::Context;
 use sue::{DistanceKind, EstimatorSettings, Sue, SueParams};
 use vpr_core::{
     Descriptors, Error, Poses, Retrieval,
-    knn::{self, Metric, RowSource, SearchParams},
-    map::{About, Access, Names, OpenMap, Opening},
+    knn::{self, Metric, RowSource, SearchParams, Selected},
+    map::{About, Access, Names, OpenMap, Opening, Origins},
 };
 use vpr_data::exchange::{self, Format, Parts};
 
@@ -41,6 +41,9 @@ pub(crate) struct InputArgs {
     /// How many references are ranked, for estimators that look at similarities
     #[arg(long, default_value_t = 50, value_name = "N")]
     ranks: usize,
+    /// Leave out references that were regressed (`copr densify`): only images are trusted
+    #[arg(long)]
+    measured: bool,
     /// Queries at a time
     #[arg(long, default_value_t = 1024, value_name = "N")]
     batch_size: usize,
@@ -78,14 +81,29 @@ pub(crate) struct Input {
 /// Descriptors that stay on the disk, or are in memory.
 enum Rows {
     Open(OpenMap),
+    /// Those of a map in which images were taken.
+    Measured(OpenMap, Vec<usize>),
     Memory(Descriptors),
 }
 
 impl Rows {
-    fn source(&self) -> &dyn RowSource {
+    /// All rows that are looked at, as one source.
+    fn with<T>(
+        &self,
+        look: impl FnOnce(&dyn RowSource) -> vpr_core::Result<T>,
+    ) -> vpr_core::Result<T> {
         match self {
-            Self::Open(map) => map,
-            Self::Memory(rows) => rows,
+            Self::Open(map) => look(map),
+            Self::Measured(map, rows) => look(&Selected::new(map, rows.clone())?),
+            Self::Memory(rows) => look(rows),
+        }
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::Open(map) => map.len(),
+            Self::Measured(_, rows) => rows.len(),
+            Self::Memory(rows) => rows.len(),
         }
     }
 }
@@ -99,14 +117,22 @@ struct Side {
 }
 
 impl Side {
-    fn open(path: &Path) -> anyhow::Result<Self> {
+    /// `measured` leaves regressed rows out.
+    fn open(path: &Path, measured: bool) -> anyhow::Result<Self> {
         let format = Format::guess(path)?;
         if format == Format::Map {
             let map = OpenMap::open(path, Opening { access: Access::Read, trust: false })?;
             let (names, poses, about) = (map.names()?, map.poses()?, map.about().clone());
+            let origins = map.origins()?.filter(|_| measured);
+            if let Some(rows) = origins.as_ref().map(Origins::measured_rows) {
+                let names =
+                    names.map(|names| rows.iter().filter_map(|&row| names.get(row)).collect());
+                let poses = poses.map(|poses| poses.select(&rows));
+                return Ok(Self { rows: Rows::Measured(map, rows), names, poses, about });
+            }
             return Ok(Self { rows: Rows::Open(map), names, poses, about });
         }
-        let Parts { names, descriptors, poses, about } = exchange::read(format, path)?;
+        let Parts { names, descriptors, poses, about, .. } = exchange::read(format, path)?;
         let none = || Error::Empty("descriptors").in_file(path);
         let rows = Rows::Memory(descriptors.ok_or_else(none)?);
         Ok(Self { rows, names, poses, about })
@@ -116,18 +142,18 @@ impl Side {
 impl InputArgs {
     /// Opens both sides.
     pub(crate) fn open(&self) -> anyhow::Result<Input> {
-        let references = Side::open(&self.map)?;
-        let queries = Side::open(&self.queries)?;
+        let references = Side::open(&self.map, self.measured)?;
+        let queries = Side::open(&self.queries, false)?;
         check(&references.about, &queries.about)?;
         let mut about = references.about;
         let mut poses = references.poses;
         if let Some(path) = &self.map_poses {
             let (joined, coordinates) =
-                poses_of(path, references.names.as_ref(), references.rows.source().len())?;
+                poses_of(path, references.names.as_ref(), references.rows.len())?;
             poses = Some(joined);
             about.coordinates = about.coordinates.or(coordinates);
         }
-        if queries.rows.source().is_empty() {
+        if queries.rows.len() == 0 {
             return Err(Error::Empty("queries").in_file(&self.queries).into());
         }
         if self.batch_size == 0 {
@@ -159,12 +185,12 @@ impl InputArgs {
 impl Input {
     /// Number of queries.
     pub(crate) fn n_queries(&self) -> usize {
-        self.queries.source().len()
+        self.queries.len()
     }
 
     /// Number of references.
     pub(crate) fn n_references(&self) -> usize {
-        self.references.source().len()
+        self.references.len()
     }
 
     /// Retrieves batch by batch and hands on the number of the first query with what was found.
@@ -179,18 +205,16 @@ impl Input {
             return Err(Error::Parameter { name: "metric", value, reason }.into());
         }
         let params = SearchParams { metric, k: self.ranks, ..SearchParams::default() };
-        let source = self.queries.source();
-        let mut scratch = Vec::new();
-        for start in (0..source.len()).step_by(self.batch_size) {
-            let end = (start + self.batch_size).min(source.len());
-            let block = source.block(start..end, &mut scratch)?.to_vec();
-            let rows = ndarray::Array2::from_shape_vec((end - start, source.dim()), block)?;
+        for start in (0..self.n_queries()).step_by(self.batch_size) {
+            let end = (start + self.batch_size).min(self.n_queries());
+            let (dim, block) = self.queries.with(|source| {
+                let mut scratch = Vec::new();
+                Ok((source.dim(), source.block(start..end, &mut scratch)?.to_vec()))
+            })?;
+            let rows = ndarray::Array2::from_shape_vec((end - start, dim), block)?;
             let batch = Descriptors::new(rows)
                 .with_context(|| format!("queries {start} to {}", end - 1))?;
-            let found = match &self.references {
-                Rows::Open(map) => knn::search(map, &batch, &params)?,
-                Rows::Memory(rows) => knn::search(rows, &batch, &params)?,
-            };
+            let found = self.references.with(|source| knn::search(source, &batch, &params))?;
             then(start, &found)?;
         }
         Ok(())

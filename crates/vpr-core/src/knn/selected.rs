@@ -128,6 +128,29 @@ impl PositionIndex {
         found.sort_unstable();
         Ok(found)
     }
+
+    /// The `n` references nearest to `center` in space, nearest first, ties by lower index; fewer if
+    /// there are fewer.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Parameter`] if `center` is not finite.
+    pub fn nearest(&self, center: Position, n: usize) -> Result<Vec<usize>> {
+        if !center.iter().all(|value| value.is_finite()) {
+            let value = format!("{},{},{}", center.x, center.y, center.z);
+            return Err(Error::Parameter { name: "near", value, reason: "needs finite numbers" });
+        }
+        let mut found: Vec<(f64, usize)> = Vec::with_capacity(n + 1);
+        for (place, squared) in self.0.nearest_neighbor_iter_with_distance_2(center.into()) {
+            // All that are as near as the last one wanted come before they are cut.
+            if found.len() >= n && found.last().is_none_or(|&(last, _)| squared > last) {
+                break;
+            }
+            found.push((squared, place.index));
+        }
+        found.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        Ok(found.into_iter().take(n).map(|(_, index)| index).collect())
+    }
 }
 
 /// Finds the `k` references nearest to every query among those given, exactly; the indices of the
@@ -184,6 +207,23 @@ mod tests {
                 .filter(|&index| nalgebra::distance(&poses.position(index), &center) <= radius)
                 .collect();
             prop_assert_eq!(PositionIndex::new(&poses).unwrap().within(center, radius).unwrap(), expected);
+        }
+
+        #[test]
+        fn the_nearest_are_those_of_a_look_at_every_position(
+            places in prop::collection::vec((-9_i8..9, -9_i8..9, -2_i8..2), 0..80),
+            center in (-9_i8..9, -9_i8..9), n in 0_usize..9,
+        ) {
+            let position = |&(x, y, z): &(i8, i8, i8)| Position::new(x.into(), y.into(), z.into());
+            let poses = Poses::Spatial(places.iter().map(position).collect());
+            let center = position(&(center.0, center.1, 0));
+            let mut expected: Vec<usize> = (0..poses.len()).collect();
+            expected.sort_by(|&a, &b| {
+                let squared = |index| nalgebra::distance_squared(&poses.position(index), &center);
+                squared(a).total_cmp(&squared(b))
+            });
+            expected.truncate(n);
+            prop_assert_eq!(PositionIndex::new(&poses).unwrap().nearest(center, n).unwrap(), expected);
         }
 
         #[test]

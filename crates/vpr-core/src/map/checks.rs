@@ -69,6 +69,9 @@ pub(super) fn check_companions(path: &Path, header: &Header, rows: &Rows) -> Res
     if has(layout::NAMES) != has(layout::NAME_OFFSETS) {
         return lone(layout::NAMES, layout::NAME_OFFSETS);
     }
+    if has(layout::ANCHORS) != has(layout::ANCHOR_OFFSETS) {
+        return lone(layout::ANCHORS, layout::ANCHOR_OFFSETS);
+    }
     if has(layout::SCALES) != int8 {
         return lone(layout::SCALES, "int8 descriptors");
     }

@@ -1,8 +1,8 @@
-//! What a map file holds beside descriptors: poses and names.
+//! What a map file holds beside descriptors: poses, names, origins.
 
 use nalgebra::{Isometry3, Point2, Point3, Quaternion, Translation3, UnitQuaternion};
 
-use super::{MapFile, Names, checks, layout};
+use super::{MapFile, Names, Origins, checks, layout};
 use crate::{Error, Poses, Result};
 
 impl MapFile {
@@ -86,13 +86,31 @@ impl MapFile {
         if !self.header().tensors.contains_key(layout::NAMES) {
             return Ok(None);
         }
-        let offsets = self.read_tensor(layout::NAME_OFFSETS)?;
-        let offsets: Vec<i64> =
-            offsets.as_chunks().0.iter().map(|bytes| i64::from_le_bytes(*bytes)).collect();
+        let offsets = integers(&self.read_tensor(layout::NAME_OFFSETS)?);
         let names = Names::from_parts(self.read_tensor(layout::NAMES)?, &offsets)
             .map_err(|reason| Error::format(self.path(), "tensor `names`", reason))?;
         Ok(Some(names))
     }
+
+    /// Which rows were regressed and from which others; `None` if all were measured.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] if the file is damaged, or if an anchor is no measured row of it.
+    pub fn origins(&self) -> Result<Option<Origins>> {
+        if !self.header().tensors.contains_key(layout::ANCHORS) {
+            return Ok(None);
+        }
+        let offsets = integers(&self.read_tensor(layout::ANCHOR_OFFSETS)?);
+        let anchors = integers(&self.read_tensor(layout::ANCHORS)?);
+        let origins = Origins::from_parts(&anchors, &offsets)
+            .map_err(|reason| Error::format(self.path(), "tensor `anchors`", reason))?;
+        Ok(Some(origins))
+    }
+}
+
+fn integers(bytes: &[u8]) -> Vec<i64> {
+    bytes.as_chunks().0.iter().map(|bytes| i64::from_le_bytes(*bytes)).collect()
 }
 
 fn doubles(bytes: &[u8]) -> Vec<f64> {

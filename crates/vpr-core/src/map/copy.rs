@@ -33,6 +33,8 @@ pub fn merge(maps: &[OpenMap], target: &Path) -> Result<usize> {
     for file in files {
         let (poses, names) = (file.poses()?, file.names()?);
         writer.begin(file.len(), poses.as_ref(), names.as_ref())?;
+        // Anchors are rows of their own file.
+        writer.add_origins(file.origins()?.as_ref(), file.len(), writer.len())?;
         let per_block = layout::rows_per_block(file.dim() * file.row_type().size());
         for start in (0..file.len()).step_by(per_block) {
             let rows = start..(start + per_block).min(file.len());
@@ -58,6 +60,7 @@ pub fn merge(maps: &[OpenMap], target: &Path) -> Result<usize> {
 pub fn copy_as(map: &OpenMap, row_type: RowType, target: &Path) -> Result<usize> {
     let mut writer = MapWriter::create(target, map.dim(), row_type, map.about().clone())?;
     writer.begin(map.len(), map.poses()?.as_ref(), map.names()?.as_ref())?;
+    writer.add_origins(map.origins()?.as_ref(), map.len(), 0)?;
     let per_block = layout::rows_per_block(map.dim() * RowType::F32.size());
     let mut scratch = Vec::new();
     for start in (0..map.len()).step_by(per_block) {

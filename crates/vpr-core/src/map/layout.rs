@@ -19,6 +19,10 @@ pub(super) const POSITIONS: &str = "positions";
 pub(super) const ORIENTATIONS: &str = "orientations";
 /// `n + 1`, i64: where in `names` each name starts.
 pub(super) const NAME_OFFSETS: &str = "name_offsets";
+/// `n + 1`, i64: where in `anchors` those of each row start.
+pub(super) const ANCHOR_OFFSETS: &str = "anchor_offsets";
+/// i64: the rows that regressed rows were computed from.
+pub(super) const ANCHORS: &str = "anchors";
 /// UTF-8 bytes of all names.
 pub(super) const NAMES: &str = "names";
 /// Up to seven bytes after the descriptors, so that doubles are aligned.
@@ -27,8 +31,18 @@ pub(super) const PADDING: &str = "padding";
 pub(super) const DIGESTS: &str = "block_digests";
 
 /// All tensors in the order they lie in the file.
-pub(super) const ORDER: [&str; 8] =
-    [DESCRIPTORS, PADDING, POSITIONS, ORIENTATIONS, NAME_OFFSETS, SCALES, NAMES, DIGESTS];
+pub(super) const ORDER: [&str; 10] = [
+    DESCRIPTORS,
+    PADDING,
+    POSITIONS,
+    ORIENTATIONS,
+    NAME_OFFSETS,
+    ANCHOR_OFFSETS,
+    ANCHORS,
+    SCALES,
+    NAMES,
+    DIGESTS,
+];
 
 /// Metadata: what kind of safetensors file this is.
 pub(super) const FORMAT: (&str, &str) = ("format", "vpr-map 1");
@@ -165,7 +179,8 @@ pub(super) fn check_shape(path: &Path, name: &str, entry: &TensorEntry, n: u64) 
         SCALES => (ElementType::F32, &[&[n]]),
         POSITIONS => (ElementType::F64, &[&[n, 2], &[n, 3]]),
         ORIENTATIONS => (ElementType::F64, &[&[n, 4]]),
-        NAME_OFFSETS => (ElementType::I64, &[&[n + 1]]),
+        NAME_OFFSETS | ANCHOR_OFFSETS => (ElementType::I64, &[&[n + 1]]),
+        ANCHORS => (ElementType::I64, &[&[entry.n_bytes() / 8]]),
         NAMES => (ElementType::U8, &[&[entry.n_bytes()]]),
         PADDING => (ElementType::U8, &[&[1], &[2], &[3], &[4], &[5], &[6], &[7]]),
         DIGESTS => (ElementType::U8, &[&[entry.n_bytes() / 16, 16]]),

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{About, Map, MapFile, Names, Opening, RowType, segments::Manifest};
+use super::{About, Map, MapFile, Names, Opening, Origins, RowType, segments::Manifest};
 use crate::{Descriptors, Error, Poses, Result, knn::RowSource};
 
 /// A map on disk, open for reading: one file, or all segments of a folder as one sequence of rows.
@@ -154,6 +154,23 @@ impl OpenMap {
         Ok(Some(all))
     }
 
+    /// Which rows were regressed and from which others; `None` if all were measured.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`MapFile::origins`].
+    pub fn origins(&self) -> Result<Option<Origins>> {
+        let mut all = Origins::default();
+        let mut any = false;
+        for file in &self.segments {
+            let origins = file.origins()?;
+            any |= origins.is_some();
+            let origins = origins.unwrap_or_else(|| Origins::measured(file.len()));
+            all.extend(&origins, all.len());
+        }
+        Ok(any.then_some(all))
+    }
+
     /// The whole map in memory.
     ///
     /// # Errors
@@ -231,7 +248,7 @@ mod tests {
     use super::*;
     use crate::{
         PlanarPosition,
-        map::{GrowingMap, merge},
+        map::{GrowingMap, MapWriter, Origin, merge},
     };
 
     fn rows(n: usize, seed: usize) -> Array2<f32> {
@@ -279,6 +296,50 @@ mod tests {
             assert_eq!(merge(std::slice::from_ref(&map), &path).unwrap(), 9);
             let merged = OpenMap::open(&path, Opening::default()).unwrap();
             assert_eq!(merged.to_map().unwrap(), map.to_map().unwrap());
+        }
+    }
+
+    #[test]
+    fn regressed_rows_stay_regressed_through_merging_and_copying() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let mut writer = MapWriter::create(&path("a"), 3, RowType::F32, About::default()).unwrap();
+        writer.append(rows(2, 0).view(), Some(&poses(2, 0)), None).unwrap();
+        let mut origins = Origins::default();
+        origins.push_regressed(&[1]).unwrap();
+        origins.push_regressed(&[0, 1]).unwrap();
+        writer.append_regressed(rows(2, 9).view(), Some(&poses(2, 9)), None, &origins).unwrap();
+        // Rows of which nothing is said are measured.
+        writer.append(rows(1, 5).view(), Some(&poses(1, 5)), None).unwrap();
+        writer.finish().unwrap();
+        let mut plain = MapWriter::create(&path("b"), 3, RowType::F32, About::default()).unwrap();
+        plain.append(rows(2, 0).view(), Some(&poses(2, 0)), None).unwrap();
+        plain.finish().unwrap();
+        let open = |name: &str| OpenMap::open(&path(name), Opening::default()).unwrap();
+        assert_eq!(open("b").origins().unwrap(), None);
+        assert_eq!(open("a").origins().unwrap().unwrap().measured_rows(), [0, 1, 4]);
+        merge(&[open("b"), open("a")], &path("c")).unwrap();
+        crate::map::copy_as(&open("c"), RowType::I8, &path("d")).unwrap();
+        for name in ["c", "d"] {
+            let origins = open(name).origins().unwrap().unwrap();
+            assert_eq!(origins.get(4), Some(Origin::Regressed(&[3])));
+            assert_eq!(origins.get(5), Some(Origin::Regressed(&[2, 3])));
+            assert_eq!(origins.measured_rows(), [0, 1, 2, 3, 6]);
+            assert!(crate::map::verify(&path(name)).is_empty());
+        }
+    }
+
+    #[test]
+    fn an_anchor_that_is_no_measured_row_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map");
+        let mut writer = MapWriter::create(&path, 3, RowType::F32, About::default()).unwrap();
+        writer.append(rows(1, 0).view(), None, None).unwrap();
+        for anchor in [1, 2] {
+            let mut origins = Origins::default();
+            origins.push_regressed(&[anchor]).unwrap();
+            let err = writer.append_regressed(rows(1, 0).view(), None, None, &origins);
+            assert!(err.unwrap_err().to_string().contains("row 1: is regressed from row"));
         }
     }
 

@@ -14,7 +14,7 @@ const MOST_ROWS: usize = 1000;
 /// Lists every problem of a map file, or of a folder that holds a growing map.
 ///
 /// Reads every byte: header, shapes, digests of all blocks, finiteness of descriptors and poses,
-/// lengths of quaternions, names (empty, twice, not those of the stored list). An empty list means
+/// lengths of quaternions, names (empty, twice, not those of the stored list), origins. An empty list means
 /// that the map is sound. Of each kind of problem the first thousand rows are named.
 #[must_use]
 pub fn verify(path: &Path) -> Vec<Error> {
@@ -57,6 +57,7 @@ fn verify_file(path: &Path, problems: &mut Vec<Error>) {
     if let Some(names) = report(problems, file.names()).flatten() {
         verify_names(&file, &names, problems);
     }
+    report(problems, file.origins());
 }
 
 /// Keeps the value, or the problem.

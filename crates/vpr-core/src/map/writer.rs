@@ -8,7 +8,7 @@ use std::{
 use ndarray::ArrayView2;
 
 use super::{
-    About, BlockDigest, Map, Names, RowType,
+    About, BlockDigest, Map, Names, Origins, RowType,
     header::{ElementType, Header, TensorEntry},
     layout::{self, Rows},
 };
@@ -32,6 +32,7 @@ pub struct MapWriter {
     scales: Vec<f32>,
     poses: Option<Poses>,
     names: Option<Names>,
+    origins: Option<Origins>,
 }
 
 impl MapWriter {
@@ -60,6 +61,7 @@ impl MapWriter {
             scales: Vec::new(),
             poses: None,
             names: None,
+            origins: None,
         })
     }
 
@@ -95,6 +97,51 @@ impl MapWriter {
         }
         self.begin(descriptors.nrows(), poses, names)?;
         self.push_rows(descriptors)
+    }
+
+    /// Adds rows of which some are regressed: as [`Self::append`], and where each row is from. Anchors
+    /// are rows of the map that is being written, measured ones.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::append`]; [`Error::Mismatch`] if there is not an origin for every row, and
+    /// [`Error::Format`] if an anchor is no measured row up to here.
+    pub fn append_regressed(
+        &mut self,
+        descriptors: ArrayView2<'_, f32>,
+        poses: Option<&Poses>,
+        names: Option<&Names>,
+        origins: &Origins,
+    ) -> Result<()> {
+        let before = self.rows.len;
+        self.add_origins(Some(origins), descriptors.nrows(), 0)?;
+        self.append(descriptors, poses, names).inspect_err(|_| {
+            self.origins.iter_mut().for_each(|all| all.truncate(before));
+        })
+    }
+
+    /// Takes where the next `n_rows` rows are from; their anchors are counted from row `shift`.
+    /// Rows of which nothing is said are measured.
+    pub(super) fn add_origins(
+        &mut self,
+        origins: Option<&Origins>,
+        n_rows: usize,
+        shift: usize,
+    ) -> Result<()> {
+        let Some(origins) = origins else { return Ok(()) };
+        if origins.len() != n_rows {
+            let (what, actual) = ("origins of rows, one per descriptor", origins.len());
+            return Err(Error::Mismatch { what, expected: n_rows, actual });
+        }
+        let all = self.origins.get_or_insert_default();
+        let said = all.len();
+        (said..self.rows.len).for_each(|_| all.push_measured());
+        all.extend(origins, shift);
+        let checked = all.check_from(self.rows.len);
+        checked.map_err(|(row, reason)| {
+            all.truncate(self.rows.len);
+            Error::format(&self.path, format!("row {row}"), reason)
+        })
     }
 
     /// Adds rows whose poses and names have been given to [`Self::begin`].
@@ -287,6 +334,16 @@ impl MapWriter {
         if let Some((_, offsets)) = &names {
             let bytes = offsets.iter().flat_map(|offset| offset.to_le_bytes()).collect();
             tensors.push((layout::NAME_OFFSETS, ElementType::I64, vec![n + 1], bytes));
+        }
+        if let Some(origins) = self.origins.as_ref().filter(|origins| origins.n_regressed() > 0) {
+            let mut origins = origins.clone();
+            (origins.len()..n).for_each(|_| origins.push_measured());
+            let (anchors, offsets) = origins.to_parts();
+            let bytes = |values: &[i64]| values.iter().flat_map(|it| it.to_le_bytes()).collect();
+            let offsets = bytes(&offsets);
+            tensors.push((layout::ANCHOR_OFFSETS, ElementType::I64, vec![n + 1], offsets));
+            let shape = vec![anchors.len()];
+            tensors.push((layout::ANCHORS, ElementType::I64, shape, bytes(&anchors)));
         }
         if self.rows.row_type == RowType::I8 {
             let bytes = self.scales.iter().flat_map(|scale| scale.to_le_bytes()).collect();

@@ -32,6 +32,7 @@ mod correlation;
 mod curve;
 mod economy;
 mod invariance;
+mod median;
 mod operating_point;
 mod platform;
 mod recall;
@@ -45,6 +46,7 @@ pub use correlation::spearman;
 pub use curve::{Positives, PrecisionRecall, auc_pr, average_precision, precision_recall_curve};
 pub use economy::{EncodingReference, Platform, RealTimeMatches, pcu, rmf};
 pub use invariance::area_between_curves;
+pub use median::median;
 pub use operating_point::{
     accuracy, extended_precision, f1_curve, f1_max, precision_at_full_recall, recall_at_precision,
 };

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use vpr_core::{
     Descriptors, Error, Map, Pose, Poses, Result,
-    map::{About, MapWriter, Names, OpenMap, RowType},
+    map::{About, MapWriter, Names, OpenMap, Origins, RowType},
 };
 
 /// Names, descriptors and poses of the same images in the same order, as far as a file has them.
@@ -16,6 +16,8 @@ pub struct Parts {
     pub descriptors: Option<Descriptors>,
     /// Their poses.
     pub poses: Option<Poses>,
+    /// Which of them are regressed from others; only maps can say so.
+    pub origins: Option<Origins>,
     /// What else is known.
     pub about: About,
 }
@@ -47,6 +49,7 @@ impl Parts {
             names: map.names()?,
             descriptors: Some(map.descriptors()?),
             poses: map.poses()?,
+            origins: map.origins()?,
             about: map.about().clone(),
         })
     }
@@ -61,6 +64,7 @@ impl Parts {
             ("image names", self.names.as_ref().map(Names::len)),
             ("descriptors", self.descriptors.as_ref().map(Descriptors::len)),
             ("poses", self.poses.as_ref().map(Poses::len)),
+            ("origins of rows", self.origins.as_ref().map(Origins::len)),
         ];
         let known: Vec<_> =
             lengths.into_iter().filter_map(|(what, len)| Some((what, len?))).collect();
@@ -119,7 +123,11 @@ impl Parts {
         self.check()?;
         let descriptors = self.descriptors()?;
         let mut writer = MapWriter::create(path, descriptors.dim(), row_type, self.about.clone())?;
-        writer.append(descriptors.view(), self.poses.as_ref(), self.names.as_ref())?;
+        let (rows, poses, names) = (descriptors.view(), self.poses.as_ref(), self.names.as_ref());
+        match &self.origins {
+            Some(origins) => writer.append_regressed(rows, poses, names, origins)?,
+            None => writer.append(rows, poses, names)?,
+        }
         writer.finish().map(drop)
     }
 

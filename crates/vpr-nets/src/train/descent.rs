@@ -41,6 +41,24 @@ pub trait Trainable: Module {
     fn loss(&self, images: Tensor<4>, places: &[usize]) -> Tensor<1>;
 }
 
+/// What learns from batches of any kind; [`Trainable`] is one that learns from images of places.
+pub trait Learner: Module {
+    /// What one step sees.
+    type Batch: Send;
+
+    /// The loss of a batch, a tensor of shape `[1]` on `device`.
+    fn learn(&self, batch: Self::Batch, device: &Device) -> Tensor<1>;
+}
+
+impl<M: Trainable> Learner for M {
+    type Batch = Batch;
+
+    fn learn(&self, batch: Batch, device: &Device) -> Tensor<1> {
+        let places = batch.places.clone();
+        self.loss(batch.tensor(device), &places)
+    }
+}
+
 /// How to train.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Descent {
@@ -84,11 +102,11 @@ impl Descent {
     /// # Errors
     ///
     /// Those of `batch`, of `observe` and of the checkpoint.
-    pub fn run<M: Trainable>(
+    pub fn run<M: Learner>(
         &self,
         module: M,
         checkpoint: &Checkpoint,
-        batch: impl Fn(usize) -> Result<Batch> + Sync,
+        batch: impl Fn(usize) -> Result<M::Batch> + Sync,
         mut observe: impl FnMut(&Report, &M) -> Result<()>,
     ) -> Result<M> {
         let device = Device::flex().autodiff();
@@ -111,8 +129,7 @@ impl Descent {
             });
             for (step, batch) in (first..self.steps).zip(receiver) {
                 let batch = batch?;
-                let places = batch.places.clone();
-                let loss = module.loss(batch.tensor(&device), &places);
+                let loss = module.learn(batch, &device);
                 let rate = self.schedule.rate(step);
                 let value = f64::from(loss.clone().into_scalar::<f32>());
                 let gradients = GradientsParams::from_grads(loss.backward(), &module);

@@ -21,7 +21,7 @@ mod whitening;
 pub use augment::augment;
 pub use batches::{Arrangement, Batches, Sizes, variants};
 pub use checkpoint::Checkpoint;
-pub use descent::{Batch, Descent, Report, Trainable};
+pub use descent::{Batch, Descent, Learner, Report, Trainable};
 pub use log::Log;
 pub use optimizer::Optimizer;
 pub use pixels::{Album, Pixels, planes};

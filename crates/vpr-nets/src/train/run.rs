@@ -9,7 +9,7 @@ use std::{
 use vpr_core::Error as CoreError;
 use vpr_files::replace;
 
-use super::{Batch, Checkpoint, Descent, Log, Report, Trainable};
+use super::{Checkpoint, Descent, Learner, Log, Report};
 use crate::{Error, Result};
 
 /// The file of settings in the folder of a run.
@@ -102,11 +102,11 @@ impl Run {
     ///
     /// Those of `batch`, of `cells`, of the log and of the checkpoint; [`CoreError::Parameter`] if
     /// checkpoints fall between two lines, where a mean would be lost.
-    pub fn descend<M: Trainable>(
+    pub fn descend<M: Learner>(
         &mut self,
         descent: &Descent,
         module: M,
-        batch: impl Fn(usize) -> vpr_core::Result<Batch> + Sync,
+        batch: impl Fn(usize) -> vpr_core::Result<M::Batch> + Sync,
         mut cells: impl FnMut(&Report, &M) -> vpr_core::Result<Vec<String>>,
     ) -> Result<M> {
         let every = self.log.every();
@@ -181,7 +181,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::train::{Optimizer, Schedule, seeded};
+    use crate::train::{Batch, Optimizer, Schedule, Trainable, seeded};
 
     /// One linear layer over the mean colour of an image; its loss pulls places apart.
     #[derive(Module, Debug)]

@@ -50,6 +50,7 @@ pub struct Tensor {
 pub struct Weights {
     path: std::path::PathBuf,
     digest: String,
+    facts: BTreeMap<String, String>,
     tensors: BTreeMap<String, Tensor>,
 }
 
@@ -110,11 +111,13 @@ impl Weights {
     ///
     /// Those of [`Self::open`], reading apart.
     pub fn read(path: &Path, bytes: &[u8]) -> Result<Self> {
+        let mut facts = BTreeMap::new();
         let tensors = if zip::is_archive(bytes) {
             zip::read(path, bytes)?
         } else if legacy::is_legacy(bytes) {
             legacy::read(path, bytes)?
         } else {
+            facts = safetensors::facts(path, bytes)?;
             safetensors::read(path, bytes)?
         };
         if tensors.is_empty() {
@@ -122,7 +125,7 @@ impl Weights {
         }
         let tensors = storage::without_shared_prefix(tensors);
         let digest = hexadecimal(&Sha256::digest(bytes));
-        Ok(Self { path: path.to_owned(), digest, tensors })
+        Ok(Self { path: path.to_owned(), digest, facts, tensors })
     }
 
     /// The file they are from.
@@ -135,6 +138,12 @@ impl Weights {
     #[must_use]
     pub fn digest(&self) -> &str {
         &self.digest
+    }
+
+    /// What [`save`] was given beside the weights; nothing for formats that have no place for it.
+    #[must_use]
+    pub fn facts(&self) -> &BTreeMap<String, String> {
+        &self.facts
     }
 
     /// Keys in order, each with its tensor.
@@ -208,7 +217,7 @@ impl Weights {
     ///
     /// [`Error::Weights`] as for [`load`].
     pub fn apply<M: ModuleSnapshot>(self, module: &mut M) -> Result<Report> {
-        let Self { path, digest, tensors } = self;
+        let Self { path, digest, tensors, .. } = self;
         let (n_tensors, n_values) = apply::apply(&path, tensors, module)?;
         Ok(Report { n_tensors, n_values, digest })
     }

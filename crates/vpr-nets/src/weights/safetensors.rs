@@ -2,18 +2,27 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use safetensors::{Dtype, SafeTensors};
+use safetensors::{Dtype, SafeTensorError, SafeTensors};
 use vpr_files::pickle::Element;
 
 use super::{Tensor, storage};
 use crate::{Error, Result};
 
+/// What stands beside the tensors.
+pub(super) fn facts(path: &Path, bytes: &[u8]) -> Result<BTreeMap<String, String>> {
+    let (_, header) =
+        SafeTensors::read_metadata(bytes).map_err(|err| not_safetensors(path, &err))?;
+    Ok(header.metadata().iter().flatten().map(|(key, it)| (key.clone(), it.clone())).collect())
+}
+
+fn not_safetensors(path: &Path, err: &SafeTensorError) -> Error {
+    let reason = format!("neither a checkpoint of PyTorch nor safetensors: {err}");
+    Error::format(path, "header", reason)
+}
+
 /// All tensors of a file.
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<BTreeMap<String, Tensor>> {
-    let file = SafeTensors::deserialize(bytes).map_err(|err| {
-        let reason = format!("neither a checkpoint of PyTorch nor safetensors: {err}");
-        Error::format(path, "header", reason)
-    })?;
+    let file = SafeTensors::deserialize(bytes).map_err(|err| not_safetensors(path, &err))?;
     let mut tensors = BTreeMap::new();
     for (key, view) in file.iter() {
         let element = match view.dtype() {

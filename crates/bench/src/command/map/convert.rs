@@ -42,6 +42,10 @@ pub(super) fn run(args: &ConvertArgs) -> anyhow::Result<Outcome> {
         return Ok(Outcome::Success);
     }
     let parts = exchange::read(from, &args.input)?;
+    if let Some(origins) = parts.origins.as_ref().filter(|_| to != Format::Map) {
+        let n = origins.n_regressed();
+        cli::note(&format!("`{to}` cannot say which rows are regressed: {n} of them are"));
+    }
     match (to, args.row_type) {
         (Format::Map, Some(row_type)) => parts.write_map(&args.out, row_type),
         _ => exchange::write(to, &args.out, &parts),

@@ -20,6 +20,9 @@ pub(super) fn run(args: &InfoArgs) -> anyhow::Result<Outcome> {
     line("references", &map.len().to_string());
     line("dimension", &map.dim().to_string());
     line("row type", &map.row_type().to_string());
+    if let Some(origins) = map.origins()? {
+        line("regressed", &origins.n_regressed().to_string());
+    }
     line("segments", &map.segments().len().to_string());
     let first = &map.segments()[0];
     line("poses", first.pose_kind().unwrap_or("none"));

@@ -31,10 +31,13 @@ pub(super) struct SearchArgs {
     /// Search only references at most RADIUS metres from X,Y (and height zero, or Z)
     #[arg(long, value_name = "X,Y[,Z],RADIUS", allow_hyphen_values = true)]
     near: Option<Near>,
+    /// Leave out references that were regressed (`copr densify`): only images are trusted
+    #[arg(long)]
+    measured: bool,
     /// Search the graph that `build --approximate` left beside the map: faster, and a neighbour may
     /// be missing; distances are exact
     #[cfg(feature = "approximate")]
-    #[arg(long, conflicts_with = "near")]
+    #[arg(long, conflicts_with_all = ["near", "measured"])]
     approximate: bool,
     /// Do not check digests and finiteness of the blocks that are read
     #[arg(long)]
@@ -79,16 +82,23 @@ pub(super) fn run(args: &SearchArgs) -> anyhow::Result<Outcome> {
     let descriptors = queries.descriptors.ok_or_else(none)?;
     let metric = args.metric.or(map.about().metric).unwrap_or_default();
     let params = SearchParams { metric, k: args.k, ..SearchParams::default() };
+    let measured = map.origins()?.filter(|_| args.measured);
     let retrieval = match &args.near {
         #[cfg(feature = "approximate")]
         None if args.approximate => {
             super::approximate::search(&args.map, &map, &descriptors, &params)?
         }
-        None => knn::search(&map, &descriptors, &params)?,
+        None => match &measured {
+            None => knn::search(&map, &descriptors, &params)?,
+            Some(origins) => {
+                knn::search_among(&map, origins.measured_rows(), &descriptors, &params)?
+            }
+        },
         Some(near) => {
             let no_poses = || Error::Empty("poses").in_file(&args.map);
             let index = PositionIndex::new(&map.poses()?.ok_or_else(no_poses)?)?;
-            let rows = index.within(near.center, near.radius)?;
+            let mut rows = index.within(near.center, near.radius)?;
+            rows.retain(|&row| measured.as_ref().is_none_or(|origins| origins.is_measured(row)));
             knn::search_among(&map, rows, &descriptors, &params)?
         }
     };

@@ -1,0 +1,23 @@
+//! `copr run`: experiment files.
+
+use copr::study::{self, Context, Study};
+use vpr_report::cli::{self, Bar, Outcome, RunArgs};
+use vpr_study::Sources;
+
+/// The name by which experiment files call this program.
+pub(super) const CHAPTER: &str = "copr";
+
+pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
+    let experiments = args.open::<Study>(CHAPTER)?;
+    let bar = Bar::default();
+    let workspace_data = args.workspace_data();
+    let sources = Sources::new([&*args.data.data, &workspace_data], &args.data.cache, &bar);
+    let bare = Sources::new([], &args.data.cache, &bar);
+    let mut outcome = Outcome::Success;
+    for experiment in &experiments {
+        let context = Context { sources: &sources, bare: &bare, seed: experiment.seed };
+        let report = study::run(experiment, context)?;
+        outcome = outcome.and(cli::finish(experiment, &report, &args.output)?);
+    }
+    Ok(outcome)
+}

@@ -1,0 +1,266 @@
+//! `copr train`: the regression network H on descriptors of a frozen encoder.
+
+use std::{
+    ops::Range,
+    path::{Path, PathBuf},
+    slice,
+};
+
+use anyhow::{bail, ensure};
+use clap::Subcommand;
+use copr::{
+    net::{Pairs, Training, train},
+    sequences,
+    study::{Context, Paths, Study},
+};
+use vpr_core::{
+    Definition, Map, Poses,
+    map::{OpenMap, Opening},
+};
+use vpr_nets::train::{Report, Run};
+use vpr_report::{
+    cli::{self, Bar, DataArgs, Outcome},
+    experiment,
+};
+use vpr_study::Sources;
+
+use super::run::CHAPTER;
+
+/// What to train.
+#[derive(clap::Args)]
+pub(crate) struct TrainArgs {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// H: from one anchor and a relative pose to a descriptor
+    Regressor(Box<RegressorArgs>),
+}
+
+/// Pairs, settings and output.
+#[derive(clap::Args)]
+struct RegressorArgs {
+    /// Map whose images H learns from: each anchor with the images that follow it
+    #[arg(long, value_name = "PATH", requires = "validation", conflicts_with = "experiment")]
+    training: Option<PathBuf>,
+    /// Map whose pairs say when H was best
+    #[arg(long, value_name = "PATH", requires = "training")]
+    validation: Option<PathBuf>,
+    /// Instead of maps: the generated rooms of this experiment, queries for training and references
+    /// for validation, as the thesis has it (C-10)
+    #[arg(long, value_name = "FILE", required_unless_present = "training")]
+    experiment: Option<PathBuf>,
+    /// Which of the experiment's encoders
+    #[arg(long, default_value = "default", value_name = "NAME")]
+    encoder: String,
+    /// Train on the first half of each query path and validate on the second, so that no reference is
+    /// seen
+    #[arg(long, requires = "experiment")]
+    held_out: bool,
+    #[command(flatten)]
+    data: DataArgs,
+    /// Every so many-th image of a sequence is an anchor [default: 50, or what the experiment says]
+    #[arg(long, value_name = "K")]
+    every: Option<usize>,
+    /// Whether H is told of translations in the axes of the world, as released, or of the anchor
+    #[arg(long, value_enum, default_value_t = Relative::Corrected, value_name = "NAME")]
+    definition: Relative,
+    /// The weights to write; the log lands beside them [default: data/models/copr-<ENCODER>.safetensors]
+    #[arg(long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Folder of checkpoints [default: target/copr-<name of the output>]
+    #[arg(long, value_name = "DIR")]
+    checkpoints: Option<PathBuf>,
+    /// Number of steps
+    #[arg(long, default_value_t = Training::default().steps)]
+    steps: usize,
+    /// Pairs in a step
+    #[arg(long, default_value_t = Training::default().batch)]
+    batch: usize,
+    /// Learning rate of the first step
+    #[arg(long, default_value_t = Training::default().rate)]
+    rate: f64,
+    /// Steps after which the rate is halved
+    #[arg(long, default_value_t = Training::default().halved_every)]
+    halved_every: usize,
+    /// Steps between two validations
+    #[arg(long, default_value_t = Training::default().validated_every)]
+    validated_every: usize,
+    /// Hidden layers
+    #[arg(long, default_value_t = Training::default().hidden_layers)]
+    layers: usize,
+    /// Decides first weights and the order of pairs
+    #[arg(long, default_value_t = Training::default().seed)]
+    seed: u64,
+    /// Only say how many pairs there are
+    #[arg(long)]
+    dry_run: bool,
+}
+
+/// See [`Definition`].
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Relative {
+    /// In the axes of the world
+    Published,
+    /// In the axes of the anchor
+    Corrected,
+}
+
+pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<Outcome> {
+    let What::Regressor(args) = &args.what;
+    args.run()
+}
+
+/// Pairs to learn from, pairs to validate on, and whose descriptors they are.
+struct Material {
+    training: Pairs,
+    validation: Pairs,
+    encoder: String,
+}
+
+impl RegressorArgs {
+    fn run(&self) -> anyhow::Result<Outcome> {
+        let Material { training, validation, encoder } = match (&self.training, &self.validation) {
+            (Some(training), Some(validation)) => self.of_maps(training, validation)?,
+            _ => self.of_rooms()?,
+        };
+        let settings = self.settings();
+        if self.dry_run {
+            let (n, n_validation, dim) = (training.len(), validation.len(), training.dim());
+            cli::print(&format!(
+                "training pairs: {n}\nvalidation pairs: {n_validation}\ndimension: {dim}\n"
+            ))?;
+            return Ok(Outcome::Success);
+        }
+        let name = format!("data/models/copr-{}.safetensors", self.encoder);
+        let output = self.output.clone().unwrap_or_else(|| name.into());
+        let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let folder = self.checkpoints.clone();
+        let folder = folder.unwrap_or_else(|| Path::new("target").join(format!("copr-{stem}")));
+        let facts = settings.facts(&training, &validation, &encoder);
+        let log = settings.log(&output.with_extension("log.csv"));
+        let mut run = Run::open(&folder, &facts, log)?;
+        let pairs = (&training, &validation);
+        let network = train(&settings, pairs, &mut run, &folder, (&output, &facts), show)?;
+        cli::note(&format!("{}: sha256 {}", output.display(), network.digest()));
+        Ok(Outcome::Success)
+    }
+
+    fn settings(&self) -> Training {
+        Training {
+            steps: self.steps,
+            batch: self.batch,
+            rate: self.rate,
+            halved_every: self.halved_every,
+            validated_every: self.validated_every,
+            seed: self.seed,
+            hidden_layers: self.layers,
+        }
+    }
+
+    fn definition(&self) -> Definition {
+        match self.definition {
+            Relative::Published => Definition::Published,
+            Relative::Corrected => Definition::Corrected,
+        }
+    }
+
+    fn of_maps(&self, training: &Path, validation: &Path) -> anyhow::Result<Material> {
+        let every = self.every.unwrap_or(50);
+        let open = |path: &Path| -> anyhow::Result<(Pairs, Option<String>)> {
+            let map = OpenMap::open(path, Opening::default())?;
+            ensure!(
+                map.origins()?.is_none(),
+                "{}: has regressed rows, which are nothing to learn from",
+                path.display()
+            );
+            let sequences = sequences(map.names()?.as_ref(), map.len());
+            let pairs = Pairs::following(map.to_map()?, &sequences, every, self.definition())
+                .map_err(|err| anyhow::Error::from(err).context(path.display().to_string()))?;
+            Ok((pairs, map.about().encoder.clone()))
+        };
+        let ((training, ours), (validation, theirs)) = (open(training)?, open(validation)?);
+        ensure!(ours == theirs, "the maps are of different encoders: {ours:?} and {theirs:?}");
+        let encoder = ours.unwrap_or_else(|| "unknown".to_owned());
+        Ok(Material { training, validation, encoder })
+    }
+
+    /// All rooms of an experiment that every clone has, one after the other.
+    fn of_rooms(&self) -> anyhow::Result<Material> {
+        let Some(path) = &self.experiment else { bail!("give `--experiment` or `--training`") };
+        let experiment = experiment::load::<Study>(path)?;
+        let path = path.display();
+        ensure!(experiment.chapter == CHAPTER, "{path}: belongs to `{}`", experiment.chapter);
+        let Some((scenes, rooms)) = experiment.study.rooms() else {
+            bail!("{path}: has no generated rooms")
+        };
+        let every = self.every.unwrap_or(rooms.every);
+        let bar = Bar::default();
+        let sources = Sources::new([&*self.data.data], &self.data.cache, &bar);
+        let bare = Sources::new([], &self.data.cache, &bar);
+        let context = Context { sources: &sources, bare: &bare, seed: experiment.seed };
+        let (mut training, mut validation) = (Joined::default(), Joined::default());
+        for scene in scenes {
+            let room = match rooms.open(scene, &self.encoder, Paths::Own, context)? {
+                Ok(room) => room,
+                Err(why) => bail!("{why}"),
+            };
+            if self.held_out {
+                for rows in &room.queries.sequences {
+                    let middle = usize::midpoint(rows.start, rows.end);
+                    let halves = (rows.start..middle, middle..rows.end);
+                    training.add(&room.queries.map, slice::from_ref(&halves.0))?;
+                    validation.add(&room.queries.map, slice::from_ref(&halves.1))?;
+                }
+            } else {
+                training.add(&room.queries.map, &room.queries.sequences)?;
+                validation.add(&room.references.map, &room.references.sequences)?;
+            }
+        }
+        let encoder = self.encoder.clone();
+        let definition = self.definition();
+        let (training, validation) =
+            (training.pairs(every, definition)?, validation.pairs(every, definition)?);
+        Ok(Material { training, validation, encoder })
+    }
+}
+
+/// Sequences of several rooms as one map.
+#[derive(Default)]
+struct Joined {
+    values: Vec<f32>,
+    poses: Vec<vpr_core::Pose>,
+    sequences: Vec<Range<usize>>,
+}
+
+impl Joined {
+    fn add(&mut self, map: &Map, sequences: &[Range<usize>]) -> anyhow::Result<()> {
+        let poses = map.poses().six_dof()?;
+        for rows in sequences {
+            let start = self.poses.len();
+            self.poses.extend_from_slice(&poses[rows.clone()]);
+            for row in rows.clone() {
+                self.values.extend(map.descriptors().row(row));
+            }
+            self.sequences.push(start..self.poses.len());
+        }
+        Ok(())
+    }
+
+    fn pairs(self, every: usize, definition: Definition) -> anyhow::Result<Pairs> {
+        let dim = self.values.len() / self.poses.len().max(1);
+        let rows = ndarray::Array2::from_shape_vec((self.poses.len(), dim), self.values)?;
+        let map = Map::new(vpr_core::Descriptors::new(rows)?, Poses::SixDof(self.poses))?;
+        Ok(Pairs::following(map, &self.sequences, every, definition)?)
+    }
+}
+
+/// Every validation on the screen, as in the log.
+#[expect(clippy::unnecessary_wraps, reason = "what training calls")]
+fn show(report: &Report, validation: f64) -> vpr_core::Result<()> {
+    let Report { step, loss, rate } = report;
+    cli::note(&format!("{step}: loss {loss:.5}, validation {validation:.5}, rate {rate:.2e}"));
+    Ok(())
+}

@@ -1,0 +1,87 @@
+//! Errors of localization as cells of a table.
+
+use vpr_core::{Provenance, metrics::bootstrap::Interval};
+use vpr_report::table::{Cell, Table};
+
+use super::Context;
+use crate::{PoseErrors, Result, WITHIN};
+
+/// How the intervals of medians are found.
+const BOOTSTRAP: &str = "bootstrap over queries";
+/// How those of differences are found.
+const PAIRED: &str = "paired bootstrap over queries";
+
+/// Median translation error, metres.
+pub(super) const MTE: &str = "MTE, m";
+/// Median rotation error, degrees.
+const MRE: &str = "MRE, °";
+/// Difference of median translation errors.
+const GAIN: &str = "MTE minus that of the sparse map, m";
+
+/// Which map was searched: what the rows of a scene are about.
+pub(super) struct Row<'a> {
+    /// The map, such as `sparse map`.
+    pub(super) map: String,
+    /// The scene.
+    pub(super) column: &'a str,
+    /// Where the numbers come from.
+    pub(super) provenance: Provenance,
+    /// What else tells it from others: encoder, paths; empty for real poses alone.
+    pub(super) of: &'a str,
+    /// The definition it follows, if there are two.
+    pub(super) definition: Option<&'static str>,
+    /// What a reader must know.
+    pub(super) note: Option<String>,
+}
+
+impl Row<'_> {
+    fn label(&self, metric: &str) -> String {
+        let of = if self.of.is_empty() { String::new() } else { format!(" / {}", self.of) };
+        format!("{metric}: {}{of}", self.map)
+    }
+
+    fn push(&self, table: &mut Table, metric: &str, interval: &Interval, n: usize, method: &str) {
+        let cell =
+            Cell::new(self.label(metric), self.column, interval.estimate, self.provenance, n);
+        let cell = cell.within(interval.low, interval.high, method);
+        let definition = self.definition.map(str::to_owned);
+        table.push(Cell { definition, note: self.note.clone(), ..cell });
+    }
+
+    /// Both medians and the shares within [`WITHIN`].
+    pub(super) fn push_errors(
+        &self,
+        table: &mut Table,
+        errors: &PoseErrors,
+        context: Context<'_>,
+    ) -> Result<()> {
+        let accuracy = errors.accuracy(&context.resampling())?;
+        let n = errors.len();
+        self.push(table, MTE, &accuracy.mte_m, n, BOOTSTRAP);
+        self.push(table, MRE, &accuracy.mre_deg, n, BOOTSTRAP);
+        for ((metres, degrees), share) in WITHIN.into_iter().zip(&accuracy.within) {
+            self.push(table, &format!("share within {metres} m, {degrees}°"), share, n, "Wilson");
+        }
+        Ok(())
+    }
+
+    /// How much better than the sparse map.
+    pub(super) fn push_gain(
+        &self,
+        table: &mut Table,
+        errors: &PoseErrors,
+        sparse: &PoseErrors,
+        context: Context<'_>,
+    ) -> Result<()> {
+        let gain = errors.mte_against(sparse, &context.resampling())?;
+        self.push(table, GAIN, &gain, errors.len(), PAIRED);
+        Ok(())
+    }
+
+    /// Cells without a value, and why.
+    pub(super) fn push_absent(&self, table: &mut Table, why: &str) {
+        for metric in [MTE, MRE] {
+            table.push(Cell::absent(self.label(metric), self.column, why));
+        }
+    }
+}

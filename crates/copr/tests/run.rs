@@ -1,0 +1,152 @@
+//! `copr run` as a user meets it, on places small enough for a test.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::print_stderr,
+    reason = "a test fails by panicking and says what it skips"
+)]
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+use copr::study::Study;
+use vpr_report::experiment;
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+}
+
+fn copr(arguments: &[&str], threads: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_copr"))
+        .current_dir(workspace())
+        .args(arguments)
+        .env_remove("VPR_DATA")
+        .env("VPR_CACHE", Path::new(env!("CARGO_TARGET_TMPDIR")).join("copr-run"))
+        .env("RAYON_NUM_THREADS", threads)
+        .output()
+        .unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// An experiment file in `dir`.
+fn write(dir: &Path, id: &str, study: &str) -> String {
+    let head = format!(
+        "id = \"{id}\"\ntitle = \"a test\"\nsource = \"a test\"\nchapter = \"copr\"\nseed = 3\n\n[study]\n"
+    );
+    let path = dir.join(format!("{id}.toml"));
+    fs::write(&path, head + study).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+const SCENE: &str = "scenes = [{ name = \"Heads\", key = \"heads\", references = [\"seq-02\"], \
+                     queries = [\"seq-01\"], kept = \"seq-02\", span_m = [0.4, 0.4] }]\n";
+const ROOMS: &str = "[study.rooms]\nplaces = 16\nquery_every = 4\nsettings = [\"camera.width=64\", \
+                     \"camera.height=48\", \"camera.focal=58.5\", \"depth=false\"]\nevery = 4\n\
+                     paths = [\"own\"]\nencoders = [\"hog\"]\n";
+
+#[test]
+fn every_experiment_of_the_chapter_can_be_read() {
+    let mut n = 0;
+    for entry in fs::read_dir(workspace().join("experiments")).unwrap() {
+        let path = entry.unwrap().path();
+        let is_of_chapter =
+            || fs::read_to_string(&path).unwrap().contains("\nchapter = \"copr\"\n");
+        if path.extension().is_some_and(|it| it == "toml") && is_of_chapter() {
+            experiment::load::<Study>(&path).unwrap();
+            n += 1;
+        }
+    }
+    assert!(n >= 4, "{n} experiments");
+}
+
+#[test]
+fn a_room_is_extrapolated_the_same_for_any_number_of_threads() {
+    let dir = tempfile::tempdir().unwrap();
+    let methods = "methods = [{ method = \"plane\", definition = \"corrected\" }, \
+                   { method = \"network\", weights = \"models/none.safetensors\" }, \
+                   { method = \"control\", control = \"random\" }]\n";
+    let study =
+        format!("kind = \"extrapolation\"\nevery = 4\nstep_m = 0.2\n{SCENE}{methods}{ROOMS}");
+    let path = write(dir.path(), "extrapolation", &study);
+    let run = |threads| {
+        let output = copr(&["run", &path, "--data", "data", "--format", "csv"], threads);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let one = run("1");
+    for part in [
+        "MTE, m: dense map, oracle",
+        "MTE, m: sparse map / hog, room",
+        "dense map, Lin. Reg. / hog, room",
+        "models/none.safetensors is not at hand",
+        "random rows",
+        "generated",
+        "paired bootstrap over queries",
+        "7-Scenes poses: no poses at hand",
+    ] {
+        assert!(one.contains(part), "`{part}` is not in: {one}");
+    }
+    assert_eq!(one, run("2"));
+}
+
+#[test]
+fn a_room_is_interpolated_as_released_and_as_it_should_be() {
+    let dir = tempfile::tempdir().unwrap();
+    let methods = "methods = [{ method = \"linear-interpolation\" }, \
+                   { method = \"plane\", definition = \"published\" }]\n";
+    let study = format!("kind = \"interpolation\"\nevery = 4\n{SCENE}{methods}{ROOMS}");
+    let path = write(dir.path(), "interpolation", &study);
+    let output = copr(&["run", &path, "--data", "data", "--format", "json"], "2");
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let out = text(&output.stdout);
+    for part in ["ground-truth map", "Lin. Interp.", "published", "corrected", "sees its own"] {
+        assert!(out.contains(part), "`{part}` is not in: {out}");
+    }
+}
+
+/// Oracle rows follow from the published camera paths alone.
+#[test]
+fn oracle_rows_of_real_poses_are_those_of_an_independent_computation() {
+    let Some(data) = std::env::var_os("VPR_DATA").map(PathBuf::from) else {
+        println!("skipped: VPR_DATA is not set");
+        return;
+    };
+    if !data.join("7scenes/poses").is_dir() {
+        println!("skipped: VPR_DATA has no 7scenes/poses");
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    for (id, expected) in [
+        ("table-6.1", [0.0846, 0.0729, 0.0337, 0.0729, 0.0757, 0.2156, 0.1184]),
+        ("table-6.3", [0.1094, 0.1905, 0.0974, 0.1198, 0.1159, 0.1309, 0.1384]),
+    ] {
+        // Without the generated rooms.
+        let file = fs::read_to_string(workspace().join(format!("experiments/{id}.toml"))).unwrap();
+        let file = file.replace("encoders = [\"default\"]", "encoders = []");
+        let path = dir.path().join(format!("{id}.toml"));
+        fs::write(&path, file).unwrap();
+        let data = data.to_str().unwrap();
+        let path = path.to_str().unwrap();
+        let output = copr(&["run", path, "--data", data, "--format", "json"], "2");
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        let table: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let cells = table["cells"].as_array().unwrap();
+        let scenes = ["Chess", "Fire", "Heads", "Office", "Pumpkin", "Redkitchen", "Stairs"];
+        for (scene, expected) in scenes.iter().zip(expected) {
+            let cell = cells.iter().find(|it| {
+                it["row"] == "MTE, m: dense map, oracle"
+                    && it["column"] == *scene
+                    && it["definition"] != "corrected"
+            });
+            let value = cell.unwrap()["value"].as_f64().unwrap();
+            assert!((value - expected).abs() < 6e-5, "{id}, {scene}: {value}, not {expected}");
+        }
+    }
+}
