@@ -258,7 +258,7 @@ fn a_report_has_a_run_per_estimator() {
     let world = World::new();
     let more = ["--lambda", "5", "--resamples", "50", "--report", "out.html"];
     success(&world.with("evaluate", &more));
-    let html = std::fs::read_to_string(world.path("out.html")).unwrap();
+    let html = fs::read_to_string(world.path("out.html")).unwrap();
     for part in ["SUE", "L2-distance", "PA-Score", "sue evaluate", "id=\"curves\""] {
         assert!(html.contains(part), "{part}");
     }
