@@ -52,7 +52,7 @@ pub(super) fn run(
             }
         };
         let setting = Setting { sparse, queries, targets: &targets };
-        let sparse_errors = setting.push(table, methods, &row, context)?;
+        let sparse_errors = setting.push(table, methods, row, context)?;
         if let (Aside::Views {}, Some(views)) = (place.targets, &opened.views) {
             let errors = localize(&joined(sparse, views)?, queries)?;
             let row = row("dense map, 3D Model", None, None);
