@@ -6,10 +6,12 @@ use anyhow::Context;
 use sue::{DistanceKind, EstimatorSettings, Sue, SueParams};
 use vpr_core::{
     Descriptors, Error, Poses, Retrieval,
-    knn::{self, Metric, RowSource, SearchParams},
+    knn::{self, Metric, RowLengths, RowSource, SearchParams},
     map::{About, Access, Names, OpenMap, Opening},
 };
 use vpr_data::exchange::{self, Format, Parts};
+
+use super::normalization::{Measured, NormalizationArgs, unit_distance};
 
 /// Map and queries, and what the estimators are told.
 #[derive(clap::Args)]
@@ -23,6 +25,8 @@ pub(crate) struct InputArgs {
     /// Descriptors of the queries
     #[arg(long, value_name = "PATH")]
     queries: PathBuf,
+    #[command(flatten)]
+    normalization: NormalizationArgs,
     /// Number of best references that spatial estimators look at
     #[arg(short, long, default_value_t = 10, value_name = "K")]
     k: usize,
@@ -71,6 +75,8 @@ pub(crate) struct Input {
     pub(crate) about: About,
     /// What the estimators are told.
     pub(crate) settings: EstimatorSettings,
+    /// Whether descriptors are scaled to length 1.
+    pub(crate) normalized: bool,
     ranks: usize,
     batch_size: usize,
 }
@@ -87,6 +93,16 @@ impl Rows {
             Self::Open(map) => map,
             Self::Memory(rows) => rows,
         }
+    }
+
+    /// As the map says, or measured.
+    fn lengths(&self) -> vpr_core::Result<Option<RowLengths>> {
+        if let Self::Open(map) = self
+            && let Some(said) = map.row_lengths()?
+        {
+            return Ok(Some(said));
+        }
+        RowLengths::of(self.source())
     }
 }
 
@@ -141,6 +157,16 @@ impl InputArgs {
         let base = *Sue::corrected().params();
         let sue = SueParams { k: self.k, lambda: self.lambda, distance, clip_m: self.clip, ..base };
         Sue::new(sue)?;
+        let (expected, actual) = (references.rows.source().dim(), queries.rows.source().dim());
+        if expected != actual {
+            let what = "dimension of the query descriptors";
+            return Err(Error::Mismatch { what, expected, actual }.in_file(&self.queries).into());
+        }
+        let sides = [
+            Measured { path: &self.map, lengths: references.rows.lengths()? },
+            Measured { path: &self.queries, lengths: queries.rows.lengths()? },
+        ];
+        let normalized = self.normalization.decide(about.metric.unwrap_or_default(), &sides)?;
         Ok(Input {
             references: references.rows,
             queries: queries.rows,
@@ -150,6 +176,7 @@ impl InputArgs {
             query_poses: queries.poses,
             about,
             settings: EstimatorSettings { sue, nth: self.nth },
+            normalized,
             ranks: self.ranks.max(self.k).max(2),
             batch_size: self.batch_size,
         })
@@ -172,12 +199,7 @@ impl Input {
         &self,
         mut then: impl FnMut(usize, &Retrieval) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        let metric = self.about.metric.unwrap_or_default();
-        if metric != Metric::Euclidean {
-            let value = vpr_core::map::metric_name(metric).to_owned();
-            let reason = "estimators need Euclidean distances";
-            return Err(Error::Parameter { name: "metric", value, reason }.into());
-        }
+        let metric = if self.normalized { Metric::Cosine } else { Metric::Euclidean };
         let params = SearchParams { metric, k: self.ranks, ..SearchParams::default() };
         let source = self.queries.source();
         let mut scratch = Vec::new();
@@ -191,6 +213,7 @@ impl Input {
                 Rows::Open(map) => knn::search(map, &batch, &params)?,
                 Rows::Memory(rows) => knn::search(rows, &batch, &params)?,
             };
+            let found = if self.normalized { unit(&found)? } else { found };
             then(start, &found)?;
         }
         Ok(())
@@ -211,6 +234,14 @@ impl Input {
         let indices = ndarray::Array2::from_shape_vec(shape, indices)?;
         Ok(Retrieval::new(indices, ndarray::Array2::from_shape_vec(shape, distances)?)?)
     }
+}
+
+/// The same references at the distances of unit descriptors.
+fn unit(by_cosine: &Retrieval) -> vpr_core::Result<Retrieval> {
+    let shape = (by_cosine.len(), by_cosine.k());
+    let indices = ndarray::Array2::from_shape_fn(shape, |it| by_cosine.indices(it.0)[it.1]);
+    let distance = |it: (usize, usize)| unit_distance(by_cosine.distances(it.0)[it.1]);
+    Retrieval::new(indices, ndarray::Array2::from_shape_fn(shape, distance))
 }
 
 /// The name of an image, or its number.

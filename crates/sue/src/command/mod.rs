@@ -4,6 +4,8 @@ pub(crate) mod calibrate;
 pub(crate) mod estimate;
 pub(crate) mod evaluate;
 mod input;
+mod normalization;
 pub(crate) mod run;
+mod threshold;
 pub(crate) mod train;
 mod truth;

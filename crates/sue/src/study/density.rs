@@ -31,16 +31,15 @@ pub(super) fn push_all(
     nth: &[usize],
     context: Context<'_>,
 ) -> Result<()> {
-    let resampling = context.resampling();
     let plain = &opened.score(&[EstimatorChoice::Sue])?[0];
-    opened.push_auc(table, (row, "none"), plain, None, &resampling)?;
+    opened.push_auc(table, (row, "none"), plain, None)?;
     for (density, suffix) in [(Density::Distinct, ""), (Density::Plain, ", eq. 5.12 as written")] {
         for &nth in nth {
             let column = format!("k={nth}{suffix}");
             match compensated(opened, nth, density) {
                 Ok(uncertainty) => {
                     let scored = Scored { name: "", uncertainty: Ok(uncertainty), own: None };
-                    opened.push_auc(table, (row, &column), &scored, None, &resampling)?;
+                    opened.push_auc(table, (row, &column), &scored, None)?;
                 }
                 Err(err @ (Error::NoDensity { .. } | Error::Core(_))) => {
                     let cell = opened.cell(row, &column, 0.0).noted(err.to_string());

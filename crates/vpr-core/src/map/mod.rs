@@ -10,6 +10,7 @@ mod header;
 mod layout;
 mod names;
 mod open_map;
+mod row_lengths;
 mod row_type;
 mod segments;
 mod touch;
