@@ -8,7 +8,7 @@
 #[path = "../tests/promise/draw.rs"]
 mod draw;
 
-use draw::{Kept, Population, Wrong, goal};
+use draw::{Outcome, Population, Wrong, goal};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -29,10 +29,10 @@ fn shares(population: Population, n: usize, risk: f64) -> sue::Result<(f64, f64)
         rng.set_stream(set);
         population.calibrate(n, goal(PRECISION, risk), &mut rng)
     };
-    let sets: Vec<Kept> = (0..SETS).into_par_iter().map(one).collect::<sue::Result<_>>()?;
+    let sets: Vec<Outcome> = (0..SETS).into_par_iter().map(one).collect::<sue::Result<_>>()?;
     let share =
-        |is: fn(Kept) -> bool| sets.iter().filter(|it| is(**it)).count() as f64 / SETS as f64;
-    Ok((share(|it| it != Kept::NoThreshold), share(|it| it == Kept::Broken)))
+        |is: fn(Outcome) -> bool| sets.iter().filter(|it| is(**it)).count() as f64 / SETS as f64;
+    Ok((share(|it| it != Outcome::NoThreshold), share(|it| it == Outcome::Broken)))
 }
 
 /// Ties of every share, over a few numbers of values; risk .1.

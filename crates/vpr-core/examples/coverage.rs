@@ -313,7 +313,7 @@ fn resampled(ranked: &[bool], resamples: usize, rng: &mut ChaCha8Rng) -> Vec<(f6
     areas
 }
 
-/// Percentile, BCa, logit with the bootstrap's variance, studentised on the logit scale.
+/// Percentile, `BCa`, logit with the bootstrap's variance, studentised on the logit scale.
 fn bootstraps(ranked: &[bool], resampled: Vec<(f64, f64)>) -> [(f64, f64); 4] {
     let once = vec![1.0; ranked.len()];
     let Some((value, influence)) = area(ranked, &once) else { return [(0.0, 1.0); 4] };
@@ -352,9 +352,11 @@ fn bootstraps(ranked: &[bool], resampled: Vec<(f64, f64)>) -> [(f64, f64); 4] {
         .collect();
     ratios.sort_by(f64::total_cmp);
     let error = variance(&influence, &once).sqrt() * slope(value);
-    let end = |share| match ratios.is_empty() {
-        true => value,
-        false => expit(logit(value) - quantile(&ratios, share) * error),
+    let end = |share| {
+        if ratios.is_empty() {
+            return value;
+        }
+        expit(logit(value) - quantile(&ratios, share) * error)
     };
     [percentile, bca, logit_interval, (end(0.975), end(0.025))]
 }

@@ -18,7 +18,7 @@ pub(super) fn run(
     context: Context<'_>,
 ) -> Result<()> {
     for (opened, _) in open(table, subjects, "none", context)? {
-        push_all(table, &opened, &opened.row, nth, context)?;
+        push_all(table, &opened, &opened.row, nth)?;
     }
     Ok(())
 }
@@ -29,7 +29,6 @@ pub(super) fn push_all(
     opened: &Labelled,
     row: &str,
     nth: &[usize],
-    context: Context<'_>,
 ) -> Result<()> {
     let plain = &opened.score(&[EstimatorChoice::Sue])?[0];
     opened.push_auc(table, (row, "none"), plain, None)?;

@@ -9,7 +9,7 @@ use sue::{
 
 /// How the chance of being wrong depends on `x`, uniform on (0, 1).
 #[derive(Clone, Copy, Debug)]
-pub enum Wrong {
+pub(crate) enum Wrong {
     /// `worst · x`.
     Rising(f64),
     /// The same everywhere.
@@ -25,18 +25,18 @@ pub enum Wrong {
 
 /// A population of matches.
 #[derive(Clone, Copy, Debug)]
-pub struct Population {
+pub(crate) struct Population {
     /// Who is wrong.
-    pub wrong: Wrong,
+    pub(crate) wrong: Wrong,
     /// Share of the matches whose uncertainty is `x` rounded up to one of few values.
-    pub tied: f64,
+    pub(crate) tied: f64,
     /// How many such values there are.
-    pub n_values: u32,
+    pub(crate) n_values: u32,
 }
 
 /// What one calibration set gave.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kept {
+pub(crate) enum Outcome {
     /// No threshold.
     NoThreshold,
     /// A threshold as precise as promised.
@@ -78,7 +78,7 @@ impl Population {
     }
 
     /// The precision of all matches below a limit, exactly.
-    pub fn precision_below(&self, limit: f64) -> f64 {
+    pub(crate) fn precision_below(&self, limit: f64) -> f64 {
         let plain = limit.clamp(0.0, 1.0);
         let values = f64::from(self.n_values);
         // The largest of the few values below the limit.
@@ -91,25 +91,25 @@ impl Population {
     }
 
     /// Calibrates on one set of `n` matches.
-    pub fn calibrate(
+    pub(crate) fn calibrate(
         &self,
         n: usize,
         goal: PrecisionGoal,
         rng: &mut ChaCha8Rng,
-    ) -> sue::Result<Kept> {
+    ) -> sue::Result<Outcome> {
         let (uncertainty, correct) = self.draw(n, rng);
         let threshold = calibrate_precision(&uncertainty, &correct, goal)?.threshold;
         Ok(if threshold == Threshold::NOTHING {
-            Kept::NoThreshold
+            Outcome::NoThreshold
         } else if self.precision_below(threshold.limit()) < goal.precision {
-            Kept::Broken
+            Outcome::Broken
         } else {
-            Kept::Kept
+            Outcome::Kept
         })
     }
 }
 
 /// A promise about all queries there could be.
-pub fn goal(precision: f64, risk: f64) -> PrecisionGoal {
+pub(crate) fn goal(precision: f64, risk: f64) -> PrecisionGoal {
     PrecisionGoal { precision, risk, scope: Scope::Population }
 }

@@ -168,7 +168,7 @@ fn own_match(groups: &[Group], definition: Definition) -> (f64, f64) {
     ((without / positives).max(0.0), with / positives)
 }
 
-/// The area and its variance (DeLong et al. 1988). Every group has right and wrong matches.
+/// The area and its variance (`DeLong` et al. 1988). Every group has right and wrong matches.
 fn roc_area(groups: &[Group]) -> Area {
     let n_right: f64 = groups.iter().map(|it| it.right).sum();
     let n_wrong: f64 = groups.iter().map(|it| it.wrong + it.unknown).sum();
