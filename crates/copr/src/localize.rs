@@ -7,7 +7,8 @@ use vpr_core::{
     knn::PositionIndex,
     metrics::{
         bootstrap::{
-            Interval, Resampling, Z_95, bootstrap, paired_bootstrap, pick, wilson_interval,
+            Interval, Resampling, Z_95, paired_bootstrap, percentile_bootstrap, pick,
+            wilson_interval,
         },
         median,
     },
@@ -82,7 +83,7 @@ impl PoseErrors {
     /// [`CoreError::Empty`] without queries, those of [`bootstrap`].
     pub fn accuracy(&self, resampling: &Resampling) -> Result<Accuracy> {
         let of = |values: &[f64]| {
-            bootstrap(self.len(), resampling, |queries| median(&pick(values, queries)))
+            percentile_bootstrap(self.len(), resampling, |queries| median(&pick(values, queries)))
         };
         let within =
             |(metres, degrees)| wilson_interval(self.hits(metres, degrees), self.len(), Z_95);

@@ -27,7 +27,7 @@ pub enum Error {
     },
     /// All weights of a query are too small for an f64, so the released formula divides 0 by 0.
     #[error(
-        "query {query}: every weight exp(-{lambda} d) is 0, since the nearest distance is {nearest}: \
+        "query {query}: every weight exp(-{lambda:?} d) is 0, since the nearest distance is {nearest:?}: \
          the released formula divides 0 by 0; the corrected definition has a value"
     )]
     Underflow {

@@ -25,7 +25,6 @@
 //! [`InlierCounts`] for geometric verification.
 
 pub mod calibrate;
-mod choice;
 #[cfg(feature = "study")]
 pub mod corpus;
 mod decision;
@@ -38,13 +37,12 @@ pub mod net;
 #[cfg(feature = "study")]
 pub mod study;
 
-pub use choice::{EstimatorChoice, EstimatorSettings, Prepared};
 pub use decision::Threshold;
 pub use error::{Error, Result};
 pub use estimator::{
-    Category, Density, DensityCompensatedSue, DistanceKind, Inliers, L2Distance, PaScore,
-    RatioSpread, SimilarityDistribution, StatisticalUncertainty, Sue, SueDefinition, SueParams,
-    UncertaintyEstimator, Uniform, Variance,
+    Category, Density, DensityCompensatedSue, DistanceKind, EstimatorChoice, EstimatorSettings,
+    Inliers, L2Distance, PaScore, Prepared, RatioSpread, SimilarityDistribution,
+    StatisticalUncertainty, Sue, SueDefinition, SueParams, UncertaintyEstimator, Uniform, Variance,
 };
 pub use evidence::{Evidence, InlierCounts, Needs, Neighbors, Places, Share, Variances};
 

@@ -75,7 +75,7 @@ fn estimators_are_compared_on_generated_places_the_same_for_any_number_of_thread
         text(&output.stdout)
     };
     let one = run("1");
-    for part in ["SUE", "PA-Score", "SIFT-RANSAC", "generated", "bootstrap over queries"] {
+    for part in ["SUE", "PA-Score", "SIFT-RANSAC", "generated", "Wilson, effective queries"] {
         assert!(one.contains(part), "`{part}` is not in: {one}");
     }
     let missing: Vec<&str> = one.lines().filter(|line| line.contains("XFeat-RANSAC")).collect();

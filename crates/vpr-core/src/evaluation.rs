@@ -5,7 +5,8 @@ use crate::{
     Definition, Error, GroundTruth, Result,
     metrics::{
         self, Positives,
-        bootstrap::{Interval, Resampling, bootstrap, paired_bootstrap},
+        bootstrap::{Interval, Resampling, paired_bootstrap},
+        effective::{self, Group},
     },
 };
 use serde::Serialize;
@@ -223,22 +224,47 @@ impl<'a> Evaluation<'a> {
         })
     }
 
-    /// [`Self::auc_pr`] with its percentile bootstrap interval over queries.
+    /// [`Self::auc_pr`] with its 95 % interval, [`effective::METHOD`]: Wilson's for as many queries as
+    /// the area is worth. It holds for any base rate; `docs/statistics.md` has its coverage.
     ///
     /// # Errors
     ///
-    /// As [`metrics::bootstrap::bootstrap`].
-    pub fn auc_pr_interval(
-        &self,
-        definition: Definition,
-        resampling: &Resampling,
-    ) -> Result<Interval> {
-        let statistic = |queries: &[usize]| self.resampled(queries, definition);
-        bootstrap(self.judged.len(), resampling, statistic)
+    /// As [`Self::auc_pr`].
+    pub fn auc_pr_interval(&self, definition: Definition) -> Result<Interval> {
+        let estimate = self.auc_pr(definition)?;
+        Ok(effective::precision_recall(&self.groups(), estimate, definition))
     }
 
-    /// Interval of the difference of AUC-PR, this estimator minus another, over the same drawn
-    /// queries; an interval without 0 is a difference beyond the choice of queries.
+    /// [`metrics::auc_roc`] of correct against wrong matches with its 95 % interval,
+    /// [`effective::METHOD`].
+    ///
+    /// # Errors
+    ///
+    /// As [`metrics::auc_roc`].
+    pub fn auc_roc_interval(&self) -> Result<Interval> {
+        let estimate = metrics::auc_roc(&self.confidence, &self.judged.correct)?;
+        Ok(effective::roc(&self.groups(), estimate))
+    }
+
+    /// The matches of each confidence, highest first.
+    fn groups(&self) -> Vec<Group> {
+        let starts = std::iter::once(&0).chain(&self.ends);
+        let group = |(&start, &end): (&usize, &usize)| {
+            let mut group = Group::default();
+            for &query in &self.order[start..end] {
+                *match (self.judged.correct[query], self.judged.known[query]) {
+                    (true, _) => &mut group.right,
+                    (false, true) => &mut group.wrong,
+                    (false, false) => &mut group.unknown,
+                } += 1.0;
+            }
+            group
+        };
+        starts.zip(&self.ends).map(group).collect()
+    }
+
+    /// Percentile bootstrap interval of the difference of AUC-PR, this estimator minus another, over
+    /// the same drawn queries; an interval without 0 is a difference beyond the choice of queries.
     ///
     /// Both estimators must be about the same matches; recall is relative to the correct ones.
     ///

@@ -9,13 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Deserialize;
-use vpr_core::{
-    Pose, Provenance, Result,
-    metrics::{
-        auc_roc,
-        bootstrap::{self, Resampling},
-    },
-};
+use vpr_core::{Evaluation, Judged, Pose, Provenance, Result, metrics::effective};
 use vpr_data::layout::seven_scenes;
 use vpr_report::{
     figure::Figure,
@@ -108,7 +102,7 @@ pub(super) fn run(
         let features = describe(&*extractor, images, found, pairs.width, context)?;
         for row in &method.rows {
             let counts = count(&features, found, row.matching())?;
-            report(table, &row.name, found, &counts, context.seed)?;
+            report(table, &row.name, found, &counts)?;
         }
     }
     Ok(None)
@@ -196,15 +190,12 @@ fn count(
     counts.into_iter().collect()
 }
 
-fn report(table: &mut Table, row: &str, pairs: &[Pair], counts: &[f64], seed: u64) -> Result<()> {
+fn report(table: &mut Table, row: &str, pairs: &[Pair], counts: &[f64]) -> Result<()> {
     let near: Vec<bool> = pairs.iter().map(|&(_, near)| near).collect();
-    let value = auc_roc(counts, &near)?;
-    let cell = Cell::new(row, COLUMN, value, Provenance::Measured, pairs.len());
-    let resampling = Resampling { seed, ..Resampling::default() };
-    let interval = bootstrap::bootstrap(pairs.len(), &resampling, |chosen| {
-        auc_roc(&bootstrap::pick(counts, chosen), &bootstrap::pick(&near, chosen))
-    })?;
-    table.push(cell.within(interval.low, interval.high, "bootstrap over pairs"));
+    let judged = Judged::from_flags(near.clone(), vec![true; near.len()])?;
+    let interval = Evaluation::of_confidence(counts, &judged)?.auc_roc_interval()?;
+    let cell = Cell::new(row, COLUMN, interval.estimate, Provenance::Measured, pairs.len());
+    table.push(cell.within(interval.low, interval.high, effective::METHOD));
     for (column, wanted) in [("inliers, near", true), ("inliers, far", false)] {
         let mut of: Vec<f64> =
             counts.iter().zip(&near).filter(|(_, near)| **near == wanted).map(|it| *it.0).collect();

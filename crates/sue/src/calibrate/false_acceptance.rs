@@ -73,10 +73,10 @@ impl fmt::Display for FalseAcceptance {
         }
         write!(
             f,
-            "Accept uncertainties below {}: a wrong match passes with probability at most {}, whatever the \
+            "{}: a wrong match passes with probability at most {}, whatever the \
              distribution, if new queries are exchangeable with the calibration queries. \
              {:.1} % of the correct calibration matches pass.",
-            self.threshold.limit(),
+            self.threshold.rule(),
             self.rate,
             100.0 * self.kept
         )

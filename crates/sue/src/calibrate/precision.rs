@@ -15,7 +15,7 @@ use crate::{Result, Threshold};
 pub struct PrecisionGoal {
     /// Share of the accepted matches that must be correct.
     pub precision: f64,
-    /// Chance that the promise is broken, over the choice of calibration queries.
+    /// Share of all calibration sets that may break the promise; see [`calibrate_precision`].
     pub risk: f64,
     /// Whose precision is promised.
     pub scope: Scope,
@@ -41,7 +41,7 @@ pub struct Calibrated {
     pub threshold: Threshold,
     /// Precision that is promised.
     pub precision: f64,
-    /// Chance that the promise is broken.
+    /// Share of all calibration sets that may break the promise.
     pub risk: f64,
     /// Whose precision it is.
     pub scope: Scope,
@@ -56,16 +56,34 @@ pub struct Calibrated {
 /// In how many places the sequence of tests starts.
 const N_STARTS: usize = 2;
 
-/// Chooses the threshold that accepts most while a precision is guaranteed with probability
-/// `1 − risk`, for any distribution: learn-then-test (Angelopoulos et al. 2021) with fixed-sequence
-/// tests over ranks, started in two places with half of the risk each.
+/// Chooses the threshold that accepts most while a precision is promised at a risk: learn-then-test
+/// (Angelopoulos et al. 2021) with fixed-sequence tests over ranks, started in two places with half
+/// of the risk each.
 ///
-/// Candidates are fixed before looking at labels: the `r`-th smallest uncertainty for given `r`.
-/// Below it the accepted matches are independent draws of accepted matches, so the number of wrong
-/// ones is binomial, and `P(Binomial(accepted, 1 − precision) ≤ wrong)` is a p-value for "precision
-/// is lower". From each start, ranks grow until a test fails; the last success counts. For
-/// [`Scope::NextBatch`] the p-value is hypergeometric: calibration and next matches are
-/// exchangeable.
+/// # The promise
+///
+/// **Of all calibration sets that could be drawn, at most a share `risk` gives a threshold whose
+/// precision is lower than promised**, whatever the distribution. A set that gives no threshold
+/// keeps the promise. It is *not* a promise about the sets that give one: of these a larger share
+/// can break it, at most `risk` divided by the share of sets that give one. Where the wanted
+/// precision is just out of reach, few sets give a threshold and most of these break it.
+///
+/// No procedure can do better without assumptions. Let all matches be wrong with one chance, a
+/// little above `1 − precision`, whatever their uncertainty: every threshold then breaks the
+/// promise, and any set at all, such as one without a wrong match, turns up with some chance; so
+/// of the sets that give a threshold all break it. Who knows that about a share `g` of his sets
+/// give a threshold keeps the broken ones among them below `c` with a risk of `c · g`.
+/// `docs/statistics.md` has numbers; `cargo run --example promise` makes them.
+///
+/// # How
+///
+/// Candidates are chosen before looking at labels: the `r`-th smallest uncertainty for given `r`.
+/// What is below it are independent draws of matches below it, so the number of wrong ones is
+/// binomial, and `P(Binomial(accepted, 1 − precision) ≤ wrong)` is a p-value for "precision is
+/// lower". From each start, ranks grow until a test fails; the last success counts. Equal
+/// uncertainties are accepted together or not at all; a rank with fewer below it than any test can
+/// pass is left out, which depends on no label. For [`Scope::NextBatch`] the p-value is
+/// hypergeometric: calibration and next matches are exchangeable.
 ///
 /// # Errors
 ///
@@ -101,6 +119,9 @@ pub fn calibrate_precision(
         for rank in (start..n).step_by(step(n)).chain([n]) {
             let limit = ranked.get(rank).map_or(f64::INFINITY, |it| it.0);
             let n_accepted = ranked[..rank].partition_point(|it| it.0 < limit);
+            if n_accepted < first {
+                continue;
+            }
             let n_correct = ranked[..n_accepted].iter().filter(|it| it.1).count();
             if p_value(n_accepted - n_correct, n_accepted, goal) > level {
                 break;
@@ -170,12 +191,14 @@ impl fmt::Display for Calibrated {
         };
         write!(
             f,
-            "Accept uncertainties below {}: with probability at least {} over the choice of calibration queries, \
-             at least {} {whose}, whatever their distribution, if new queries come from the same one. \
-             In calibration {} of {} were accepted, {} of them correct.",
-            self.threshold.limit(),
-            1.0 - self.risk,
+            "{}: at least {} {whose}, whatever their distribution, if new queries come from the same one. Of all \
+             calibration sets at most a share of {} breaks this, those without a threshold counted as kept; of \
+             those with one, at most {} divided by their share. In calibration {} of {} were accepted, {} of them \
+             correct.",
+            self.threshold.rule(),
             self.precision,
+            self.risk,
+            self.risk,
             self.n_accepted,
             self.n,
             self.n_correct
@@ -252,6 +275,30 @@ mod tests {
         let uncertainty: Vec<f64> = (0..200).map(f64::from).collect();
         let result = calibrate_precision(&uncertainty, &[true; 200], goal).unwrap();
         assert_eq!(result.n_accepted, 200);
-        assert!(result.to_string().starts_with("Accept uncertainties below inf"), "{result}");
+        assert!(result.to_string().starts_with("Accept every match: at least 0.95"), "{result}");
+    }
+
+    #[test]
+    fn equal_uncertainties_are_accepted_together() {
+        let goal = PrecisionGoal { precision: 0.95, risk: 0.1, scope: Scope::Population };
+        let accepted = |uncertainty: &[f64], correct: &[bool]| {
+            calibrate_precision(uncertainty, correct, goal).unwrap().n_accepted
+        };
+        // All the same, in halves, and most at the lowest or the highest value.
+        assert_eq!(accepted(&[0.0; 200], &[true; 200]), 200);
+        for low in [1, 20, 100, 150, 199] {
+            let uncertainty: Vec<f64> = (0..200).map(|i| f64::from(u8::from(i >= low))).collect();
+            assert_eq!(accepted(&uncertainty, &[true; 200]), 200, "{low} of 200 at 0");
+            // Where the higher half is wrong, the lower one is accepted if it is enough.
+            let correct: Vec<bool> = (0..200).map(|i| i < low).collect();
+            let expected = if low < 59 {
+                0
+            } else if low > 195 {
+                200
+            } else {
+                low
+            };
+            assert_eq!(accepted(&uncertainty, &correct), expected, "{low} of 200 at 0");
+        }
     }
 }

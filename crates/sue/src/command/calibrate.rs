@@ -8,7 +8,7 @@ use sue::{
 use vpr_core::Judged;
 use vpr_report::cli::{self, Outcome};
 
-use super::{input::InputArgs, truth::TruthArgs};
+use super::{input::InputArgs, threshold::Origin, truth::TruthArgs};
 
 /// The promise, and the queries it rests on.
 #[derive(clap::Args)]
@@ -19,7 +19,8 @@ pub(crate) struct CalibrateArgs {
     /// Share of accepted matches that must be correct
     #[arg(long, default_value_t = 0.95, value_name = "P")]
     precision: f64,
-    /// Chance that the promise is broken
+    /// Share of all calibration sets that may break the promise. Sets that give no threshold keep it;
+    /// of those that give one, at most R divided by their share break it
     #[arg(long, default_value_t = 0.1, value_name = "R")]
     risk: f64,
     /// Whose precision is promised
@@ -32,7 +33,7 @@ pub(crate) struct CalibrateArgs {
     input: InputArgs,
     #[command(flatten)]
     truth: TruthArgs,
-    /// Print one JSON object instead of a sentence
+    /// Print one JSON object instead of a sentence; `sue estimate --threshold FILE` reads it
     #[arg(long)]
     json: bool,
 }
@@ -65,12 +66,20 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
         let result = calibrate_precision(&uncertainty, judged.correct(), goal)?;
         (result.to_string(), serde_json::to_value(result)?)
     };
-    if args.json {
-        let mut object = object;
-        object["guarantee"] = words.into();
-        cli::print(&format!("{object:#}\n"))?;
-    } else {
+    if !args.json {
         cli::print(&format!("{words}\n"))?;
+        return Ok(Outcome::Success);
     }
+    let origin = Origin {
+        estimator: args.estimator,
+        settings: input.settings,
+        normalized: input.normalized,
+    };
+    let mut object = object;
+    object["guarantee"] = words.into();
+    for (key, value) in serde_json::to_value(origin)?.as_object().into_iter().flatten() {
+        object[key] = value.clone();
+    }
+    cli::print(&format!("{object:#}\n"))?;
     Ok(Outcome::Success)
 }

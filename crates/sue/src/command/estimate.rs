@@ -9,7 +9,10 @@ use vpr_core::Retrieval;
 use vpr_files::{npy, replace};
 use vpr_report::cli::{self, Outcome};
 
-use super::input::{Input, InputArgs, name_of};
+use super::{
+    input::{Input, InputArgs, name_of},
+    threshold::{Origin, ThresholdArg},
+};
 
 /// Estimator, map, queries and output.
 #[derive(clap::Args)]
@@ -26,9 +29,10 @@ pub(crate) struct EstimateArgs {
     /// Format of the output
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
     format: OutputFormat,
-    /// Also say whether each match is accepted: uncertainties below this are
-    #[arg(long, value_name = "U", allow_hyphen_values = true)]
-    threshold: Option<f64>,
+    /// Also say whether each match is accepted: uncertainties below this are. A number, `everything`,
+    /// `nothing`, or a file that `sue calibrate --json` wrote
+    #[arg(long, value_name = "U|FILE", allow_hyphen_values = true)]
+    threshold: Option<ThresholdArg>,
     /// Write there instead of stdout
     #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
@@ -65,8 +69,9 @@ impl Sink {
 pub(crate) fn run(args: &EstimateArgs) -> anyhow::Result<Outcome> {
     let is_npy = args.format == OutputFormat::Npy;
     ensure!(!is_npy || args.out.is_some(), "`--format npy` needs `--out`: it is no text");
-    let threshold = args.threshold.map(Threshold::below).transpose()?;
     let input = args.input.open()?;
+    let origin = args.origin(&input);
+    let threshold = args.threshold.as_ref().map(|it| it.open(origin.as_ref())).transpose()?;
     let variances = args.variances.as_deref().map(npy::read_f32).transpose()?;
     if let (Some(variances), Some(path)) = (&variances, &args.variances) {
         let (n, n_queries) = (variances.nrows(), input.n_queries());
@@ -74,21 +79,26 @@ pub(crate) fn run(args: &EstimateArgs) -> anyhow::Result<Outcome> {
     }
     let prepared = args.estimator.prepare(&input.settings, input.poses.as_ref())?;
     let mut sink = Sink { text: String::new(), keep: args.out.is_some() };
-    let mut all = Vec::new();
-    sink.add(header(args.format, threshold))?;
+    let (mut all, mut n_lone) = (Vec::new(), 0);
     input.each_batch(|first, retrieval| {
         let uncertainty = match &variances {
             Some(values) => {
                 let rows = values.slice(ndarray::s![first..first + retrieval.len(), ..]);
                 Variance::named("variance").estimate(&Variances::new(rows)?)?
             }
-            None => prepared.estimate(retrieval)?,
+            None => {
+                n_lone += prepared.n_lone(retrieval);
+                prepared.estimate(retrieval)?
+            }
         };
         if is_npy {
             all.extend(&uncertainty);
             return Ok(());
         }
-        sink.add(&lines(args.format, &input, first, retrieval, &uncertainty, threshold))
+        // The header comes with the first lines: an error has none before it.
+        let head = if first == 0 { header(args.format, threshold) } else { "" };
+        let lines = lines(args.format, &input, first, retrieval, &uncertainty, threshold);
+        sink.add(&(head.to_owned() + &lines))
     })?;
     sink.add(if args.format == OutputFormat::Json { "\n]\n" } else { "" })?;
     match (&args.out, is_npy) {
@@ -100,7 +110,31 @@ pub(crate) fn run(args: &EstimateArgs) -> anyhow::Result<Outcome> {
         (None, true) => bail!("`--format npy` needs `--out`"),
         (None, false) => {}
     }
+    args.warn_of_lone(n_lone, &input);
     Ok(Outcome::Success)
+}
+
+impl EstimateArgs {
+    /// What a threshold must have been calibrated for; nothing is for variances.
+    fn origin(&self, input: &Input) -> Option<Origin> {
+        let (estimator, settings, normalized) = (self.estimator, input.settings, input.normalized);
+        self.variances.is_none().then_some(Origin { estimator, settings, normalized })
+    }
+
+    /// Says so where most uncertainties are near 0 since one reference has all the weight. A
+    /// threshold that was calibrated with them has seen that.
+    fn warn_of_lone(&self, n_lone: usize, input: &Input) {
+        let n = input.n_queries();
+        if 2 * n_lone <= n || matches!(self.threshold, Some(ThresholdArg::File(_))) {
+            return;
+        }
+        cli::note(&format!(
+            "warning: in {n_lone} of {n} queries the best reference weighs a thousand times as much as the \
+             next, so that the spread is near 0, however wrong the match: accept by a threshold of `sue \
+             calibrate` only, or let more references count with a smaller --lambda (it is {})",
+            input.settings.sue.lambda
+        ));
+    }
 }
 
 fn header(format: OutputFormat, threshold: Option<Threshold>) -> &'static str {
@@ -137,8 +171,12 @@ fn lines(
             let comma = if first + row == 0 { "" } else { "," };
             let _ = write!(text, "{comma}\n{object}");
         } else {
-            let _ =
-                write!(text, "{},{},{distance},{uncertainty}", quoted(&query), quoted(&reference));
+            let _ = write!(
+                text,
+                "{},{},{distance:?},{uncertainty:?}",
+                quoted(&query),
+                quoted(&reference)
+            );
             if let Some(accepted) = accepted {
                 let _ = write!(text, ",{accepted}");
             }

@@ -3,7 +3,10 @@
 use sue::EstimatorChoice;
 use vpr_core::{
     Definition, Evaluation, Judged, Provenance,
-    metrics::bootstrap::{Interval, Resampling},
+    metrics::{
+        bootstrap::{Interval, Resampling},
+        effective,
+    },
 };
 use vpr_report::{
     cli::{self, Outcome, ReportArgs},
@@ -24,10 +27,10 @@ pub(crate) struct EvaluateArgs {
     input: InputArgs,
     #[command(flatten)]
     truth: TruthArgs,
-    /// Resamples of the bootstrap
+    /// Resamples of the bootstrap of differences
     #[arg(long, default_value_t = 2000, value_name = "N")]
     resamples: usize,
-    /// Seed of the bootstrap
+    /// Seed of the bootstrap of differences
     #[arg(long, default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
@@ -36,6 +39,9 @@ pub(crate) struct EvaluateArgs {
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
     format: Format,
 }
+
+/// How the intervals of differences are found.
+const DIFFERENCE: &str = "paired bootstrap over queries";
 
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     let input = args.input.open()?;
@@ -58,12 +64,13 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         if args.report.path.is_some() {
             runs.push(report::run(prepared.name(), &retrieval, uncertainty));
         }
-        push_summary(&mut table, prepared.name(), &evaluation, &resampling)?;
+        push_summary(&mut table, prepared.name(), &evaluation)?;
         match &first {
             None => first = Some(evaluation),
             Some(first) => {
                 let difference = evaluation.auc_pr_difference(first, &resampling);
-                push(&mut table, prepared.name(), "AUC-PR minus first", Ok(difference?), &judged)?;
+                let place = (prepared.name(), "AUC-PR minus first");
+                push(&mut table, place, (difference, DIFFERENCE), judged.len())?;
             }
         }
     }
@@ -72,44 +79,39 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-fn push_summary(
-    table: &mut Table,
-    row: &str,
-    evaluation: &Evaluation<'_>,
-    resampling: &Resampling,
-) -> anyhow::Result<()> {
-    let judged = evaluation.judged();
+fn push_summary(table: &mut Table, row: &str, evaluation: &Evaluation<'_>) -> anyhow::Result<()> {
+    let n = evaluation.judged().len();
     for definition in [Definition::Published, Definition::Corrected] {
         let column = format!("AUC-PR, {definition}");
-        let interval = evaluation.auc_pr_interval(definition, resampling);
-        push(table, row, &column, Ok(interval?), judged)?;
+        let interval = evaluation.auc_pr_interval(definition);
+        push(table, (row, &column), (interval, effective::METHOD), n)?;
     }
+    let interval = evaluation.auc_roc_interval();
+    push(table, (row, "AUC-ROC"), (interval, effective::METHOD), n)?;
     let summary = evaluation.summary()?;
     let values = [
-        ("AUC-ROC", summary.auc_roc),
         ("AURC", Some(summary.aurc)),
         ("excess AURC", Some(summary.excess_aurc)),
         ("R@95%P", summary.recall_at_95_precision),
     ];
     for (column, value) in values {
-        let cell = Cell::new(row, column, 0.0, Provenance::Measured, judged.len());
+        let cell = Cell::new(row, column, 0.0, Provenance::Measured, n);
         table.push(Cell { value: value.map(Into::into), ..cell });
     }
     Ok(())
 }
 
-/// A value with its interval, or none and why.
+/// A value with its interval and how that was found, or none and why.
 fn push(
     table: &mut Table,
-    row: &str,
-    column: &str,
-    interval: sue::Result<Interval>,
-    judged: &Judged,
+    (row, column): (&str, &str),
+    (interval, method): (vpr_core::Result<Interval>, &str),
+    n: usize,
 ) -> anyhow::Result<()> {
-    let cell = |value: f64| Cell::new(row, column, value, Provenance::Measured, judged.len());
+    let cell = |value: f64| Cell::new(row, column, value, Provenance::Measured, n);
     table.push(match interval {
-        Ok(it) => cell(it.estimate).within(it.low, it.high, "bootstrap over queries"),
-        Err(sue::Error::Core(err @ vpr_core::Error::Undefined { .. })) => {
+        Ok(it) => cell(it.estimate).within(it.low, it.high, method),
+        Err(err @ vpr_core::Error::Undefined { .. }) => {
             Cell { value: None, ..cell(0.0).noted(err.to_string()) }
         }
         Err(err) => return Err(err.into()),

@@ -6,10 +6,12 @@ use anyhow::Context;
 use sue::{DistanceKind, EstimatorSettings, Sue, SueParams};
 use vpr_core::{
     Descriptors, Error, Poses, Retrieval,
-    knn::{self, Metric, RowSource, SearchParams, Selected},
+    knn::{self, Metric, RowLengths, RowSource, SearchParams, Selected},
     map::{About, Access, Names, OpenMap, Opening, Origins},
 };
 use vpr_data::exchange::{self, Format, Parts};
+
+use super::normalization::{Measured, NormalizationArgs, unit_distance};
 
 /// Map and queries, and what the estimators are told.
 #[derive(clap::Args)]
@@ -23,6 +25,8 @@ pub(crate) struct InputArgs {
     /// Descriptors of the queries
     #[arg(long, value_name = "PATH")]
     queries: PathBuf,
+    #[command(flatten)]
+    normalization: NormalizationArgs,
     /// Number of best references that spatial estimators look at
     #[arg(short, long, default_value_t = 10, value_name = "K")]
     k: usize,
@@ -74,6 +78,8 @@ pub(crate) struct Input {
     pub(crate) about: About,
     /// What the estimators are told.
     pub(crate) settings: EstimatorSettings,
+    /// Whether descriptors are scaled to length 1.
+    pub(crate) normalized: bool,
     ranks: usize,
     batch_size: usize,
 }
@@ -105,6 +111,16 @@ impl Rows {
             Self::Measured(_, rows) => rows.len(),
             Self::Memory(rows) => rows.len(),
         }
+    }
+
+    /// As the map says, or measured.
+    fn lengths(&self) -> vpr_core::Result<Option<RowLengths>> {
+        if let Self::Open(map) = self
+            && let Some(said) = map.row_lengths()?
+        {
+            return Ok(Some(said));
+        }
+        self.with(|source| RowLengths::of(source))
     }
 }
 
@@ -167,6 +183,17 @@ impl InputArgs {
         let base = *Sue::corrected().params();
         let sue = SueParams { k: self.k, lambda: self.lambda, distance, clip_m: self.clip, ..base };
         Sue::new(sue)?;
+        let dim = |rows: &Rows| rows.with(|source| Ok(source.dim()));
+        let (expected, actual) = (dim(&references.rows)?, dim(&queries.rows)?);
+        if expected != actual {
+            let what = "dimension of the query descriptors";
+            return Err(Error::Mismatch { what, expected, actual }.in_file(&self.queries).into());
+        }
+        let sides = [
+            Measured { path: &self.map, lengths: references.rows.lengths()? },
+            Measured { path: &self.queries, lengths: queries.rows.lengths()? },
+        ];
+        let normalized = self.normalization.decide(about.metric.unwrap_or_default(), &sides)?;
         Ok(Input {
             references: references.rows,
             queries: queries.rows,
@@ -176,6 +203,7 @@ impl InputArgs {
             query_poses: queries.poses,
             about,
             settings: EstimatorSettings { sue, nth: self.nth },
+            normalized,
             ranks: self.ranks.max(self.k).max(2),
             batch_size: self.batch_size,
         })
@@ -198,12 +226,7 @@ impl Input {
         &self,
         mut then: impl FnMut(usize, &Retrieval) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        let metric = self.about.metric.unwrap_or_default();
-        if metric != Metric::Euclidean {
-            let value = vpr_core::map::metric_name(metric).to_owned();
-            let reason = "estimators need Euclidean distances";
-            return Err(Error::Parameter { name: "metric", value, reason }.into());
-        }
+        let metric = if self.normalized { Metric::Cosine } else { Metric::Euclidean };
         let params = SearchParams { metric, k: self.ranks, ..SearchParams::default() };
         for start in (0..self.n_queries()).step_by(self.batch_size) {
             let end = (start + self.batch_size).min(self.n_queries());
@@ -215,6 +238,7 @@ impl Input {
             let batch = Descriptors::new(rows)
                 .with_context(|| format!("queries {start} to {}", end - 1))?;
             let found = self.references.with(|source| knn::search(source, &batch, &params))?;
+            let found = if self.normalized { unit(&found)? } else { found };
             then(start, &found)?;
         }
         Ok(())
@@ -235,6 +259,14 @@ impl Input {
         let indices = ndarray::Array2::from_shape_vec(shape, indices)?;
         Ok(Retrieval::new(indices, ndarray::Array2::from_shape_vec(shape, distances)?)?)
     }
+}
+
+/// The same references at the distances of unit descriptors.
+fn unit(by_cosine: &Retrieval) -> vpr_core::Result<Retrieval> {
+    let shape = (by_cosine.len(), by_cosine.k());
+    let indices = ndarray::Array2::from_shape_fn(shape, |it| by_cosine.indices(it.0)[it.1]);
+    let distance = |it: (usize, usize)| unit_distance(by_cosine.distances(it.0)[it.1]);
+    Retrieval::new(indices, ndarray::Array2::from_shape_fn(shape, distance))
 }
 
 /// The name of an image, or its number.

@@ -34,6 +34,11 @@ pub enum Density {
 }
 
 impl DensityCompensatedSue {
+    /// The estimator that is compensated.
+    pub(super) fn sue(&self) -> &Sue {
+        &self.sue
+    }
+
     /// Measures the density of a map once.
     ///
     /// # Errors

@@ -1,10 +1,11 @@
-//! Estimators of how uncertain the best match of a query is, one file each.
+//! Estimators of how uncertain the best match of a query is, one file each, and all by name.
 
 mod density_compensated;
 mod inliers;
 mod l2_distance;
 mod pa_score;
 mod ratio_spread;
+mod registry;
 mod similarity;
 mod similarity_distribution;
 mod spread;
@@ -18,6 +19,7 @@ pub use inliers::Inliers;
 pub use l2_distance::L2Distance;
 pub use pa_score::PaScore;
 pub use ratio_spread::RatioSpread;
+pub use registry::{EstimatorChoice, EstimatorSettings, Prepared};
 pub use similarity_distribution::SimilarityDistribution;
 pub use statistical_uncertainty::StatisticalUncertainty;
 pub use sue::{DistanceKind, Sue, SueDefinition, SueParams};

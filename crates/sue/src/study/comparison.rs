@@ -37,7 +37,7 @@ pub(super) fn run(table: &mut Table, subjects: &[Subject], context: Context<'_>)
             let chance = is_within_chance(opened, &scored, it, context)?;
             let remark = it.remark().or_else(|| chance.then(|| WITHIN_CHANCE.to_owned()));
             let place = (opened.row.as_str(), it.name);
-            opened.push_auc(table, place, it, remark.as_deref(), &context.resampling())?;
+            opened.push_auc(table, place, it, remark.as_deref())?;
         }
     }
     average(table);

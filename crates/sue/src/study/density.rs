@@ -18,7 +18,7 @@ pub(super) fn run(
     context: Context<'_>,
 ) -> Result<()> {
     for (opened, _) in open(table, subjects, "none", context)? {
-        push_all(table, &opened, &opened.row, nth, context)?;
+        push_all(table, &opened, &opened.row, nth)?;
     }
     Ok(())
 }
@@ -29,18 +29,16 @@ pub(super) fn push_all(
     opened: &Labelled,
     row: &str,
     nth: &[usize],
-    context: Context<'_>,
 ) -> Result<()> {
-    let resampling = context.resampling();
     let plain = &opened.score(&[EstimatorChoice::Sue])?[0];
-    opened.push_auc(table, (row, "none"), plain, None, &resampling)?;
+    opened.push_auc(table, (row, "none"), plain, None)?;
     for (density, suffix) in [(Density::Distinct, ""), (Density::Plain, ", eq. 5.12 as written")] {
         for &nth in nth {
             let column = format!("k={nth}{suffix}");
             match compensated(opened, nth, density) {
                 Ok(uncertainty) => {
                     let scored = Scored { name: "", uncertainty: Ok(uncertainty), own: None };
-                    opened.push_auc(table, (row, &column), &scored, None, &resampling)?;
+                    opened.push_auc(table, (row, &column), &scored, None)?;
                 }
                 Err(err @ (Error::NoDensity { .. } | Error::Core(_))) => {
                     let cell = opened.cell(row, &column, 0.0).noted(err.to_string());

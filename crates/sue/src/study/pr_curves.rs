@@ -39,7 +39,7 @@ pub(super) fn run(
         };
         for it in &scored {
             let row = format!("{}: {}", opened.row, it.name);
-            opened.push_auc(table, (&row, "AUC-PR"), it, None, &context.resampling())?;
+            opened.push_auc(table, (&row, "AUC-PR"), it, None)?;
             if let Some(points) = curve(&opened, it)? {
                 sample(table, &opened, &row, &points);
                 panel.curves.push(Curve::new(it.name, points));

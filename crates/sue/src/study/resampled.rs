@@ -45,7 +45,7 @@ pub(super) fn run(
         let corpus = part_of(&opened.corpus, &queries, &references)?;
         let corpus = Arc::new(corpus);
         let part = Labelled { row: row.clone(), corpus, learned: Vec::new() };
-        push_all(table, &part, &row, plan.nth, context)?;
+        push_all(table, &part, &row, plan.nth)?;
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use std::sync::Arc;
 
-use vpr_core::{Definition, Evaluation, Judged, Provenance, metrics::bootstrap::Resampling};
+use vpr_core::{Definition, Evaluation, Judged, Provenance, metrics::effective};
 use vpr_report::table::{Cell, Table};
 use vpr_study::verification::{LocalMethod, Verified};
 
@@ -204,7 +204,6 @@ impl Labelled {
         (row, column): (&str, &str),
         scored: &Scored,
         remark: Option<&str>,
-        resampling: &Resampling,
     ) -> Result<()> {
         for definition in [Definition::Published, Definition::Corrected] {
             let empty = |why: &str| {
@@ -219,14 +218,14 @@ impl Labelled {
                 }
             };
             let evaluation = Evaluation::new(uncertainty, scored.judged(self))?;
-            table.push(match evaluation.auc_pr_interval(definition, resampling) {
+            table.push(match evaluation.auc_pr_interval(definition) {
                 Ok(it) => {
                     let cell = self.cell(row, column, it.estimate).defined(definition);
                     let cell = match remark {
                         Some(remark) => cell.noted(remark),
                         None => cell,
                     };
-                    cell.within(it.low, it.high, "bootstrap over queries")
+                    cell.within(it.low, it.high, effective::METHOD)
                 }
                 Err(err @ vpr_core::Error::Undefined { .. }) => empty(&err.to_string()),
                 Err(err) => return Err(err.into()),

@@ -13,7 +13,7 @@ pub(super) fn run(table: &mut Table, subjects: &[Subject], context: Context<'_>)
     for (opened, _) in open(table, subjects, "SUE", context)? {
         for scored in opened.score(&choices)? {
             let place = (opened.row.as_str(), scored.name);
-            opened.push_auc(table, place, &scored, None, &context.resampling())?;
+            opened.push_auc(table, place, &scored, None)?;
         }
     }
     Ok(())

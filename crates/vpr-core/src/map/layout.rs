@@ -50,6 +50,8 @@ pub(super) const FORMAT: (&str, &str) = ("format", "vpr-map 1");
 pub(super) const WRITER: &str = "writer";
 /// Metadata: digest of the image names.
 pub(super) const IMAGE_LIST: &str = "image_list_digest";
+/// Metadata: Euclidean lengths of the shortest and the longest row, as given to the writer.
+pub(super) const ROW_LENGTHS: &str = "row_lengths";
 /// Metadata: rows of descriptors that share a digest.
 pub(super) const ROWS_PER_BLOCK: &str = "rows_per_block";
 /// Metadata: digest of the table of digests.

@@ -11,6 +11,7 @@ mod layout;
 mod names;
 mod open_map;
 mod origins;
+mod row_lengths;
 mod row_type;
 mod segments;
 mod touch;

@@ -146,7 +146,10 @@ impl Origins {
                     last = end;
                 }
                 _ => {
-                    return Err(format!("offset {index} is {offset}, of {} anchors", anchors.len()));
+                    return Err(format!(
+                        "offset {index} is {offset}, of {} anchors",
+                        anchors.len()
+                    ));
                 }
             }
             if index > 0 {

@@ -14,7 +14,7 @@ use super::{
 };
 use vpr_files::NewFile;
 
-use crate::{Error, Pose, Poses, Result};
+use crate::{Error, Pose, Poses, Result, knn::RowLengths};
 
 /// Writes a map file: rows go to the disk as they come, the map appears under its name at the end.
 ///
@@ -30,6 +30,7 @@ pub struct MapWriter {
     block: Vec<u8>,
     digests: Vec<u8>,
     scales: Vec<f32>,
+    lengths: Option<RowLengths>,
     poses: Option<Poses>,
     names: Option<Names>,
     origins: Option<Origins>,
@@ -59,6 +60,7 @@ impl MapWriter {
             about,
             digests: Vec::new(),
             scales: Vec::new(),
+            lengths: None,
             poses: None,
             names: None,
             origins: None,
@@ -172,7 +174,11 @@ impl MapWriter {
     /// Adds rows that are already stored as this writer stores them.
     pub(super) fn push_stored(&mut self, bytes: &[u8], scales: &[f32]) -> Result<()> {
         self.scales.extend(scales);
-        for row in bytes.chunks_exact(self.rows.row_bytes()) {
+        let mut values = vec![0.0; self.rows.dim];
+        for (index, row) in bytes.chunks_exact(self.rows.row_bytes()).enumerate() {
+            let scale = scales.get(index).copied().unwrap_or(1.0);
+            self.rows.row_type.decode(row, scale, &mut values);
+            self.lengths = RowLengths::and(self.lengths, Some(RowLengths::of_row(&values)));
             self.block.extend(row);
             self.end_row()?;
         }
@@ -187,6 +193,7 @@ impl MapWriter {
         if self.rows.row_type == RowType::I8 {
             self.scales.push(scale);
         }
+        self.lengths = RowLengths::and(self.lengths, Some(RowLengths::of_row(row)));
         self.end_row()
     }
 
@@ -301,6 +308,8 @@ impl MapWriter {
             .map(|names| super::image_list_digest(&names.iter().collect::<Vec<_>>()));
         let digests_digest = BlockDigest::of(&self.digests).to_hex();
         header.metadata = metadata(&self.about, self.rows.per_block, digests_digest, image_list);
+        let lengths = self.lengths.map(|it| it.to_string());
+        header.metadata.extend(lengths.map(|it| (layout::ROW_LENGTHS.to_owned(), it)));
         tail.push(std::mem::take(&mut self.digests));
         let unsigned = header.render(layout::ALIGNMENT);
         let digest = layout::header_digest(&unsigned[8..], layout::NO_DIGEST).to_hex();
@@ -395,6 +404,9 @@ fn metadata(
     metadata
 }
 
+/// No length takes more digits.
+const LONGEST_NUMBER: f64 = 1.797_693_134_862_315_7e-300;
+
 /// Room for the header of a map of any size: every tensor there may be, every number at its longest.
 fn reserved_bytes(about: &About) -> u64 {
     let longest = TensorEntry {
@@ -405,7 +417,9 @@ fn reserved_bytes(about: &About) -> u64 {
     let tensors = layout::ORDER.map(|name| (name.to_owned(), longest.clone()));
     let digest = layout::NO_DIGEST.to_owned();
     let image_list = Some(super::image_list_digest::<&str>(&[]));
-    let metadata = metadata(about, usize::MAX, digest, image_list);
+    let mut metadata = metadata(about, usize::MAX, digest, image_list);
+    let lengths = RowLengths { shortest: LONGEST_NUMBER, longest: LONGEST_NUMBER };
+    metadata.insert(layout::ROW_LENGTHS.to_owned(), lengths.to_string());
     let header = Header { tensors: tensors.into(), metadata, data_start: 0 };
     header.render(layout::ALIGNMENT).len() as u64
 }

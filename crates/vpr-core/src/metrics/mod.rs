@@ -31,6 +31,7 @@ pub mod catalogue;
 mod correlation;
 mod curve;
 mod economy;
+pub mod effective;
 mod invariance;
 mod median;
 mod operating_point;

@@ -4,15 +4,13 @@ use std::io::{self, Write};
 
 use vpr_core::{
     Definition,
-    metrics::bootstrap::{Interval, Resampling, Z_95, wilson_interval},
+    metrics::bootstrap::{Interval, Z_95, wilson_interval},
 };
 
 use super::{Judged, Report, Run, chart::sample, curves::style, escape, outcome::label, short};
 
 /// Ranks of recall@N.
 const RANKS: [usize; 4] = [1, 5, 10, 20];
-/// Draws of the bootstrap; enough for two digits.
-const RESAMPLES: usize = 500;
 
 pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged]) -> io::Result<()> {
     writeln!(
@@ -71,7 +69,7 @@ pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged])
     }
     writeln!(
         out,
-        "<li>95 % intervals: Wilson's for shares of queries, {RESAMPLES} bootstrap draws of queries for AUC-PR. \
+        "<li>95 % intervals: Wilson's, for AUC-PR over the number of queries that it is worth. \
          The corrected AUC-PR counts queries whose match is wrong although a correct reference exists.</li>\n</ul>\n</section>"
     )
 }
@@ -105,8 +103,7 @@ fn areas(report: &Report<'_>, run: &Run, judged: &Judged) -> [String; 2] {
     [Definition::Published, Definition::Corrected].map(|definition| {
         let Some(evaluation) = &evaluation else { return "–".to_owned() };
         let Ok(value) = evaluation.auc_pr(definition) else { return "–".to_owned() };
-        let resampling = Resampling { n_resamples: RESAMPLES, ..Resampling::default() };
-        match evaluation.auc_pr_interval(definition, &resampling) {
+        match evaluation.auc_pr_interval(definition) {
             Ok(it) => interval(&it),
             Err(_) => format!("{value:.3}"),
         }

@@ -3,11 +3,12 @@
 use serde::{Deserialize, Serialize};
 use vpr_core::{Error, Poses, Retrieval};
 
-use crate::{
-    Category, Density, DensityCompensatedSue, Evidence, L2Distance, Needs, Neighbors, PaScore,
-    Places, RatioSpread, Result, SimilarityDistribution, StatisticalUncertainty, Sue,
-    SueDefinition, SueParams, UncertaintyEstimator, Uniform,
+use super::{
+    Category, Density, DensityCompensatedSue, L2Distance, PaScore, RatioSpread,
+    SimilarityDistribution, StatisticalUncertainty, Sue, SueDefinition, SueParams,
+    UncertaintyEstimator, Uniform,
 };
+use crate::{Evidence, Needs, Neighbors, Places, Result};
 
 /// An estimator that needs no more than a map and the queries' descriptors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -169,6 +170,26 @@ impl Prepared<'_> {
         }
     }
 
+    /// How many queries have a best reference that weighs a thousand times as much as the next: the
+    /// spread around it is near 0, however wrong the match is. 0 for estimators without weights.
+    #[must_use]
+    pub fn n_lone(&self, retrieval: &Retrieval) -> usize {
+        const OUTWEIGHED: f64 = 1e3;
+        let SueParams { k, lambda, distance, .. } = match &self.kind {
+            Kind::Sue(sue) => *sue.params(),
+            Kind::Density(density) => *density.sue().params(),
+            _ => return 0,
+        };
+        if k.min(retrieval.k()) < 2 {
+            return 0;
+        }
+        let is_lone = |&query: &usize| {
+            let distances = retrieval.distances(query);
+            lambda * (distance.of(distances[1]) - distance.of(distances[0])) > OUTWEIGHED.ln()
+        };
+        (0..retrieval.len()).filter(is_lone).count()
+    }
+
     /// One uncertainty per query, in order.
     ///
     /// # Errors
@@ -190,5 +211,30 @@ impl Prepared<'_> {
             Kind::Density(sue) => sue.estimate(&places()?),
             Kind::Uniform(uniform) => uniform.estimate(&places()?),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::array;
+
+    use super::*;
+
+    #[test]
+    fn references_that_weigh_alone_are_counted() {
+        // Squared distances .04 and .0404 count about the same; at .09 the next counts e^-17.5.
+        let distances = array![[0.2, 0.201], [0.2, 0.3]];
+        let retrieval = Retrieval::new(array![[0, 1], [1, 2]], distances).unwrap();
+        let poses = [0.0, 1.0, 2.0].map(|x| vpr_core::PlanarPosition::new(x, 0.0));
+        let poses = Poses::Planar(poses.to_vec());
+        let count = |choice: EstimatorChoice, k| {
+            let sue = SueParams { k, ..*Sue::corrected().params() };
+            let settings = EstimatorSettings { sue, nth: 1 };
+            choice.prepare(&settings, Some(&poses)).unwrap().n_lone(&retrieval)
+        };
+        assert_eq!(count(EstimatorChoice::Sue, 2), 1);
+        assert_eq!(count(EstimatorChoice::SueDensity, 2), 1);
+        assert_eq!(count(EstimatorChoice::Sue, 1), 0, "a spread of one reference is 0 by design");
+        assert_eq!(count(EstimatorChoice::L2, 2), 0);
     }
 }
