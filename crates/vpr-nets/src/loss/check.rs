@@ -1,7 +1,7 @@
 //! Checks that every loss goes through.
 
 use burn::{
-    module::Module,
+    module::{Module, Param},
     optim::GradientsParams,
     tensor::{Device, Tensor, TensorData},
 };

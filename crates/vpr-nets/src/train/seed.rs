@@ -9,17 +9,18 @@ use rand_chacha::ChaCha8Rng;
 
 /// Draws every weight of rank 2 or more anew, in the order of the module's fields: normal with
 /// variance 2 / fan-in (He, Zhang, Ren and Sun 2015). Fan-in is the first axis of a linear layer
-/// (rank 2) and all axes but the first of a convolution. What is called `bias` becomes zero, which
-/// burn would draw without our seed; other weights of rank 1, those of normalisations, stay.
+/// (rank 2) and all axes but the first of a convolution. Biases become zero: those that a linear layer
+/// is made with do not depend on the seed. Other weights of rank 1 stay.
 #[must_use]
 pub fn seeded<M: Module>(module: M, seed: u64) -> M {
-    module.map(&mut Draws { random: ChaCha8Rng::seed_from_u64(seed), path: Vec::new() })
+    let random = ChaCha8Rng::seed_from_u64(seed);
+    module.map(&mut Draws { random, field: String::new() })
 }
 
 struct Draws {
     random: ChaCha8Rng,
-    /// Names of the fields around the weight at hand, the innermost last.
-    path: Vec<String>,
+    /// The field that is being looked at.
+    field: String,
 }
 
 impl Draws {
@@ -33,22 +34,19 @@ impl Draws {
 }
 
 impl ModuleMapper for Draws {
-    fn enter_module(&mut self, name: &str, _container_type: &str) {
-        self.path.push(name.to_owned());
-    }
-
-    fn exit_module(&mut self, _name: &str, _container_type: &str) {
-        self.path.pop();
+    fn enter_module(&mut self, name: &str, _: &str) {
+        name.clone_into(&mut self.field);
     }
 
     fn map_float<const D: usize>(&mut self, param: Param<Tensor<D>>) -> Param<Tensor<D>> {
         if D < 2 {
-            let is_bias = self.path.last().is_some_and(|name| name == "bias");
-            return if is_bias {
-                param.map(|old| old.zeros_like().set_require_grad(old.is_require_grad()))
-            } else {
-                param
-            };
+            if self.field != "bias" {
+                return param;
+            }
+            return param.map(|old| {
+                let tracked = old.is_require_grad();
+                Tensor::zeros(old.dims(), &old.device()).set_require_grad(tracked)
+            });
         }
         param.map(|old| {
             let shape = old.dims();
@@ -60,5 +58,31 @@ impl ModuleMapper for Draws {
             Tensor::from_data(TensorData::new(values, shape), &old.device())
                 .set_require_grad(tracked)
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use burn::{
+        nn::{LayerNormConfig, LinearConfig},
+        tensor::Device,
+    };
+
+    use super::*;
+
+    #[test]
+    fn a_seed_decides_weights_and_leaves_nothing_to_chance() {
+        let linear = |seed| seeded(LinearConfig::new(3, 2).init(&Device::flex()), seed);
+        let values = |seed| -> [Vec<f32>; 2] {
+            let linear = linear(seed);
+            let bias = linear.bias.unwrap().val();
+            [linear.weight.val().into_data(), bias.into_data()].map(|it| it.try_to_vec().unwrap())
+        };
+        assert_eq!(values(7), values(7));
+        assert_ne!(values(7)[0], values(8)[0]);
+        assert_eq!(values(7)[1], [0.0; 2]);
+        let norm = seeded(LayerNormConfig::new(2).init(&Device::flex()), 7);
+        let gamma: Vec<f32> = norm.gamma.val().into_data().try_to_vec().unwrap();
+        assert_eq!(gamma, [1.0; 2]);
     }
 }
