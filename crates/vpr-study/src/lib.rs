@@ -6,7 +6,7 @@
 //!
 //! ```
 //! use vpr_core::metrics::recall_at;
-//! use vpr_study::{Direction, Sources, technique};
+//! use vpr_study::{Direction, Sources};
 //!
 //! let cache = tempfile::tempdir()?;
 //! let sources = Sources::new(["data".as_ref()], cache.path(), &());
