@@ -191,7 +191,8 @@ impl Observer for Bar {
     }
 }
 
-/// Prints a result and, as the flags say, writes its page or checks it.
+/// Prints a result and, as the flags say, writes its page or checks it; `without` names the methods
+/// whose weights are not at hand, which the page may have and this run cannot.
 ///
 /// # Errors
 ///
@@ -200,6 +201,7 @@ pub fn finish<S>(
     experiment: &Experiment<S>,
     report: &Report,
     output: &OutputArgs,
+    without: &[&str],
 ) -> anyhow::Result<Outcome> {
     let table = &report.table;
     print(&table.render(output.format))?;
@@ -207,7 +209,8 @@ pub fn finish<S>(
         report.write(experiment, folder)?;
     }
     let Some(folder) = &output.check else { return Ok(Outcome::Success) };
-    let Checked { findings, n_compared, n_not_at_hand } = report.check(experiment, folder)?;
+    let Checked { findings, n_compared, n_not_at_hand } =
+        report.check(experiment, folder, without)?;
     for finding in &findings {
         note(&format!("{}: {finding}", table.id));
     }
