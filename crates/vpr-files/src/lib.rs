@@ -8,7 +8,7 @@
 //! let folder = tempfile::tempdir()?;
 //! let path = folder.path().join("frames.npy");
 //! vpr_files::npy::write_i64(&path, &[3, 1, 2])?;
-//! assert_eq!(vpr_files::npy::read_i64(&path)?, [3, 1, 2]);
+//! assert_eq!(vpr_files::npy::read_i64(&path)?.to_vec(), [3, 1, 2]);
 //!
 //! // What is cut off is an error that names the place, never a shorter array.
 //! let bytes = std::fs::read(&path)?;

@@ -250,7 +250,8 @@ pub fn columns() -> usize {
     columns.filter(|columns| *columns > 0).unwrap_or(WIDTH)
 }
 
-/// Prints a result and, as the flags say, writes its page or checks it.
+/// Prints a result and, as the flags say, writes its page or checks it; `without` names the methods
+/// whose weights are not at hand, which the page may have and this run cannot.
 ///
 /// # Errors
 ///
@@ -259,6 +260,7 @@ pub fn finish<S>(
     experiment: &Experiment<S>,
     report: &Report,
     output: &OutputArgs,
+    without: &[&str],
 ) -> anyhow::Result<Outcome> {
     let table = &report.table;
     print(&table.render_within(output.format, columns()))?;
@@ -266,7 +268,8 @@ pub fn finish<S>(
         report.write(experiment, folder)?;
     }
     let Some(folder) = &output.check else { return Ok(Outcome::Success) };
-    let Checked { findings, n_compared, n_not_at_hand } = report.check(experiment, folder)?;
+    let Checked { findings, n_compared, n_not_at_hand } =
+        report.check(experiment, folder, without)?;
     for finding in &findings {
         note(&format!("{}: {finding}", table.id));
     }

@@ -82,13 +82,18 @@ impl Report {
     /// # Errors
     ///
     /// [`Error::Io`] or [`Error::Format`] for committed files that are there but cannot be read.
-    pub fn check<S>(&self, experiment: &Experiment<S>, folder: &Path) -> Result<Checked> {
+    pub fn check<S>(
+        &self,
+        experiment: &Experiment<S>,
+        folder: &Path,
+        without: &[&str],
+    ) -> Result<Checked> {
         let path = |extension: &str| folder.join(format!("{}.{extension}", self.table.id));
         let Some(committed) = present(&path("csv"), read_csv)? else {
             let findings = vec![missing(&path("csv"))];
             return Ok(Checked { findings, ..Checked::default() });
         };
-        let mut checked = check(&self.table, &committed, &experiment.expect);
+        let mut checked = check(&self.table, &committed, &experiment.expect, without);
         self.check_markdown(&mut checked, experiment, committed, &path("md"))?;
         let list = folder.join(index::FILE);
         match present(&list, read_text)? {
@@ -209,7 +214,7 @@ mod tests {
 
     fn findings(report: &Report, folder: &Path) -> Vec<String> {
         let experiment = Experiment::new("figure-0", "t", ());
-        let checked = report.check(&experiment, folder).unwrap();
+        let checked = report.check(&experiment, folder, &[]).unwrap();
         checked.findings.iter().map(ToString::to_string).collect()
     }
 

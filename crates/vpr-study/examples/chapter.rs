@@ -79,10 +79,11 @@ fn main() -> ExitCode {
         let bar = Bar::default();
         let folders = [&*args.data.data, &args.workspace_data()];
         let sources = Sources::new(folders, &args.data.cache, &bar);
+        let without = sources.without_weights()?;
         let mut outcome = Outcome::Success;
         for experiment in &experiments {
             let report = run(experiment, &sources)?;
-            outcome = outcome.and(cli::finish(experiment, &report, &args.output)?);
+            outcome = outcome.and(cli::finish(experiment, &report, &args.output, &without)?);
         }
         Ok(outcome)
     })

@@ -6,7 +6,7 @@
 //!
 //! ```
 //! use vpr_core::metrics::recall_at;
-//! use vpr_study::{Direction, Sources, technique};
+//! use vpr_study::{Direction, Sources};
 //!
 //! let cache = tempfile::tempdir()?;
 //! let sources = Sources::new(["data".as_ref()], cache.path(), &());
@@ -14,7 +14,8 @@
 //! let dataset = sources.images(world)?.expect("it is rendered on the spot");
 //! let hog = sources.runner("hog")?.expect("it needs no weights");
 //! let scores = sources.scores(&hog, &dataset, Direction::AsReleased)?;
-//! assert_eq!(recall_at(1, scores.ranking()?, &dataset.truth)?, 1.0);
+//! // Three places are hard for HOG from a pose nearby: it finds one.
+//! assert_eq!(recall_at(1, scores.ranking()?, &dataset.truth)?, 1.0 / 3.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

@@ -13,6 +13,7 @@ use crate::{
     Direction, Features, Runner, Scores, Store, Stored, Technique,
     memo::Memo,
     technique::{self, Found},
+    verification::LocalMethod,
 };
 
 /// Datasets, weights, caches, and whoever is told about progress.
@@ -176,6 +177,22 @@ impl<'a> Sources<'a> {
             Found::Runs(runner) => Some(runner),
             Found::Absent(_) => None,
         })
+    }
+
+    /// How rows and columns call what needs weights that are not at hand: no cell that names one can
+    /// be computed.
+    ///
+    /// # Errors
+    ///
+    /// Weights that are there but are not those of the network; a folder that cannot be searched.
+    pub fn without_weights(&self) -> Result<Vec<&'static str>> {
+        let mut names = technique::without_weights(|name| self.find(name))?;
+        for method in LocalMethod::ALL {
+            if method.features().find_weights(self.roots())?.is_err() {
+                names.push(method.name());
+            }
+        }
+        Ok(names)
     }
 
     /// What a technique finds on the images of a dataset, by way of [`Store::key`] of both lists:

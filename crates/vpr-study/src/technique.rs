@@ -98,6 +98,22 @@ pub fn find(name: &str, roots: &DataRoots) -> Result<Found> {
     }
 }
 
+/// Names and columns of the networks whose weights are not at hand, or that this program was built
+/// without.
+///
+/// # Errors
+///
+/// Weights that are there but are not those of the network.
+pub(crate) fn without_weights(find: impl Fn(&str) -> Result<Found>) -> Result<Vec<&'static str>> {
+    let mut names = Vec::new();
+    for (name, column) in NETWORKS {
+        if matches!(find(name)?, Found::Absent(_)) {
+            names.extend([name, column]);
+        }
+    }
+    Ok(names)
+}
+
 #[cfg(feature = "networks")]
 fn network_names() -> impl Iterator<Item = &'static str> {
     NETWORKS.into_iter().map(|entry| entry.0)

@@ -209,6 +209,10 @@ pub struct Matches<'a> {
 }
 
 impl LocalMethod {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Sift, Self::SiftFundamental, Self::Delf, Self::SuperPoint, Self::XFeat, Self::Disk];
+
     /// Its name in tables.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -12,11 +12,12 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     let bar = Bar::default();
     let folders = [&*args.data.data, &args.workspace_data()];
     let sources = Sources::new(folders, &args.data.cache, &bar);
+    let without = sources.without_weights()?;
     let mut outcome = Outcome::Success;
     for experiment in &experiments {
         let (timings, seed) = (args.output.timings, experiment.seed);
         let report = study::run(experiment, Context { sources: &sources, timings, seed })?;
-        outcome = outcome.and(cli::finish(experiment, &report, &args.output)?);
+        outcome = outcome.and(cli::finish(experiment, &report, &args.output, &without)?);
     }
     Ok(outcome)
 }

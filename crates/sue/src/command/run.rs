@@ -15,12 +15,13 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     let bar = Bar::default();
     let folders = [&*args.data.data, &args.workspace_data()];
     let corpora = Corpora::new(Sources::new(folders, &args.data.cache, &bar));
+    let without = corpora.sources().without_weights()?;
     let mut outcome = Outcome::Success;
     for experiment in &experiments {
         let context =
             Context { corpora: &corpora, timings: args.output.timings, seed: experiment.seed };
         let report = study::run(experiment, context)?;
-        outcome = outcome.and(cli::finish(experiment, &report, &args.output)?);
+        outcome = outcome.and(cli::finish(experiment, &report, &args.output, &without)?);
     }
     Ok(outcome)
 }

@@ -49,13 +49,26 @@ pub struct Checked {
 ///
 /// Every computed cell must stand on the page with the same value, number of items, interval,
 /// thesis value and note; timings are left alone. Every `generated` cell of the page must have been
-/// computed, since it needs no data; others may be missing where something is absent. Every
+/// computed, since it needs no data, but those whose row or column names one of `without`, methods
+/// whose weights are not at hand; others may be missing where something is absent. Every
 /// expectation must be about a cell that was computed or stands on the page.
 #[must_use]
-pub fn check(table: &Table, committed: &[Cell], expectations: &[Expectation]) -> Checked {
+pub fn check(
+    table: &Table,
+    committed: &[Cell],
+    expectations: &[Expectation],
+    without: &[&str],
+) -> Checked {
+    let lacks_weights = |cell: &Cell| {
+        without.iter().any(|name| cell.row.contains(name) || cell.column.contains(name))
+    };
     let computed: Vec<&Cell> = table.cells.iter().filter(|cell| is_checked(cell)).collect();
     let mut checked = Checked::default();
     for cell in &computed {
+        if cell.value.is_none() && lacks_weights(cell) {
+            checked.n_not_at_hand += 1;
+            continue;
+        }
         checked.n_compared += 1;
         match committed.iter().find(|it| it.key() == cell.key()) {
             Some(page) => checked.findings.extend(differences(cell, page)),
@@ -67,10 +80,11 @@ pub fn check(table: &Table, committed: &[Cell], expectations: &[Expectation]) ->
         if computed.iter().any(|it| it.key() == cell.key()) {
             continue;
         }
-        if cell.provenance == Provenance::Generated || !is_something_absent {
-            checked.findings.push(Finding::about(cell, "is on the page and was not computed"));
-        } else {
+        let needs_data = cell.provenance != Provenance::Generated && is_something_absent;
+        if needs_data || lacks_weights(cell) {
             checked.n_not_at_hand += 1;
+        } else {
+            checked.findings.push(Finding::about(cell, "is on the page and was not computed"));
         }
     }
     for expectation in expectations {
@@ -191,7 +205,7 @@ mod tests {
     #[test]
     fn the_same_number_passes_and_is_counted() {
         let table = table(0.5);
-        let checked = check(&table, &table.cells, &[expectation(0.5)]);
+        let checked = check(&table, &table.cells, &[expectation(0.5)], &[]);
         assert_eq!(checked, Checked { n_compared: 2, ..Checked::default() });
     }
 
@@ -199,7 +213,7 @@ mod tests {
     fn a_number_that_moved_is_found_on_both_sides() {
         let mut page = table(0.5).cells;
         page[0].interval = table(0.5001).cells[0].interval.clone();
-        let checked = check(&table(0.5001), &page, &[expectation(0.5)]);
+        let checked = check(&table(0.5001), &page, &[expectation(0.5)], &[]);
         assert_eq!(
             texts(&checked),
             [
@@ -216,7 +230,7 @@ mod tests {
         now.cells[0].n = 110;
         now.cells[0].interval = None;
         now.cells[0].note = Some("one query left out".to_owned());
-        let found = texts(&check(&now, &page, &[])).join("\n");
+        let found = texts(&check(&now, &page, &[], &[])).join("\n");
         for part in ["n: the committed page says 111, computed 110", "(Wilson), computed none"] {
             assert!(found.contains(part), "{found}");
         }
@@ -225,7 +239,7 @@ mod tests {
 
     #[test]
     fn a_cell_missing_from_the_page_is_found() {
-        assert_eq!(check(&table(0.5), &[], &[]).findings.len(), 1);
+        assert_eq!(check(&table(0.5), &[], &[], &[]).findings.len(), 1);
     }
 
     #[test]
@@ -233,15 +247,31 @@ mod tests {
         let mut now = Table::new("table-0", "t");
         now.push(Cell::absent("Corridor", "HOG", "not at hand"));
         let mut page = table(0.5).cells;
-        let checked = check(&now, &page, &[expectation(0.7)]);
+        let checked = check(&now, &page, &[expectation(0.7)], &[]);
         assert_eq!(checked, Checked { n_not_at_hand: 1, ..Checked::default() });
         page.push(Cell::new("street", "HOG", 0.5, Provenance::Generated, 9));
-        let found = texts(&check(&now, &page, &[]));
+        let found = texts(&check(&now, &page, &[], &[]));
         let expected = "street / HOG (generated): is on the page and was not computed";
         assert_eq!(found, [expected]);
         // Nothing is absent: then nothing explains what is missing.
         let empty = Table::new("table-0", "t");
-        assert_eq!(check(&empty, &table(0.5).cells, &[]).findings.len(), 1);
+        assert_eq!(check(&empty, &table(0.5).cells, &[], &[]).findings.len(), 1);
+    }
+
+    #[test]
+    fn a_method_without_its_weights_is_left_alone_and_no_other() {
+        let cell = |row: &str| Cell::new(row, "AUC-PR", 0.5, Provenance::Generated, 9);
+        let page = [cell("street: XFeat-RANSAC"), cell("street: SIFT-RANSAC")];
+        let mut now = Table::new("table-0", "t");
+        now.push(Cell { value: None, ..cell("street: XFeat-RANSAC").noted("not at hand") });
+        let found = check(&now, &page, &[], &["XFeat-RANSAC"]);
+        assert_eq!(found.n_not_at_hand, 1);
+        let expected =
+            "street: SIFT-RANSAC / AUC-PR (generated): is on the page and was not computed";
+        assert_eq!(texts(&found), [expected]);
+        assert_eq!(check(&Table::new("table-0", "t"), &page, &[], &["XFeat-RANSAC"]), found);
+        // With its weights at hand, nothing explains why it has no value.
+        assert_eq!(check(&now, &page, &[], &[]).findings.len(), 3);
     }
 
     #[test]
@@ -249,7 +279,7 @@ mod tests {
         let mut mistyped = expectation(0.5);
         mistyped.grid = Grid::single("Coridor", "HOG", 0.5);
         let table = table(0.5);
-        let found = texts(&check(&table, &table.cells, &[mistyped]));
+        let found = texts(&check(&table, &table.cells, &[mistyped], &[]));
         assert_eq!(
             found,
             ["Coridor / HOG (published): expected, but neither computed nor on the page"]
