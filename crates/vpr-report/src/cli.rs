@@ -129,9 +129,11 @@ pub fn command_line() -> String {
     let program =
         |it: String| Path::new(&it).file_name().map(|it| it.to_string_lossy().into_owned());
     let is_plain = |it: char| it.is_ascii_alphanumeric() || "-_./=:,@+%".contains(it);
-    let quoted = |it: String| match it.chars().all(is_plain) && !it.is_empty() {
-        true => it,
-        false => format!("'{}'", it.replace('\'', "'\\''")),
+    let quoted = |it: String| {
+        if it.chars().all(is_plain) && !it.is_empty() {
+            return it;
+        }
+        format!("'{}'", it.replace('\'', "'\\''"))
     };
     let mut words = std::env::args_os().map(|it| it.to_string_lossy().into_owned());
     let program = words.next().and_then(program);

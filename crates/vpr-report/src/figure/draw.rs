@@ -96,9 +96,9 @@ fn draw(plan: &Plan<'_>, caption: &str, (tolerance, cell): (i64, i64)) -> String
         } else {
             String::new()
         };
-        let _ = write!(
+        let _ = writeln!(
             out,
-            "<text x=\"{x}\" y=\"{y}\"{class}{turn}>{}</text>\n",
+            "<text x=\"{x}\" y=\"{y}\"{class}{turn}>{}</text>",
             escape(&text.content)
         );
     }
@@ -133,10 +133,10 @@ fn draw_grid(out: &mut String, frame: &Frame<'_>) {
         let at = number(tenths(x + 6.0 + share * (width - 12.0)));
         let _ = write!(grid, "M{at} {}V{}", number(tenths(y)), number(tenths(y + height)));
     }
-    let _ = write!(out, "<path class=\"g\" d=\"{grid}\"/>\n");
+    let _ = writeln!(out, "<path class=\"g\" d=\"{grid}\"/>");
     let (left, top) = (number(tenths(x)), number(tenths(y)));
     let (right, bottom) = (number(tenths(x + width)), number(tenths(y + height)));
-    let _ = write!(out, "<path class=\"a\" d=\"M{left} {top}V{bottom}H{right}\"/>\n");
+    let _ = writeln!(out, "<path class=\"a\" d=\"M{left} {top}V{bottom}H{right}\"/>");
 }
 
 fn draw_frame(out: &mut String, plan: &Plan<'_>, frame: &Frame<'_>, tolerance: (i64, i64)) {
@@ -144,7 +144,7 @@ fn draw_frame(out: &mut String, plan: &Plan<'_>, frame: &Frame<'_>, tolerance: (
     let curves = &frame.multiple.panel.curves;
     for &index in &frame.multiple.grey {
         let line = line(frame, &curves[index].points, tolerance.0);
-        let _ = write!(out, "<path class=\"o\" d=\"{line}\"/>\n");
+        let _ = writeln!(out, "<path class=\"o\" d=\"{line}\"/>");
     }
     let style = |curve: &Curve| plan.styles.iter().find(|it| it.0 == curve.name).map(|it| it.1);
     let shown = || {
@@ -158,7 +158,7 @@ fn draw_frame(out: &mut String, plan: &Plan<'_>, frame: &Frame<'_>, tolerance: (
         let (low, mut high) = (edge(|it| it.0), edge(|it| it.1));
         high.reverse();
         let around = line(frame, &[low, high].concat(), tolerance.0);
-        let _ = write!(out, "<path class=\"b c{}\" d=\"{around}Z\"/>\n", style.colour);
+        let _ = writeln!(out, "<path class=\"b c{}\" d=\"{around}Z\"/>", style.colour);
     }
     for (nth, (curve, style)) in shown().enumerate() {
         let colour = style.colour;
@@ -173,20 +173,20 @@ fn draw_frame(out: &mut String, plan: &Plan<'_>, frame: &Frame<'_>, tolerance: (
                 }
                 let dots = dots.iter().map(|it| format!("M{} {}h0", number(it.0), number(it.1)));
                 let path = dots.collect::<Vec<_>>().concat();
-                let _ = write!(out, "<path class=\"p c{colour}\" d=\"{path}\"/>\n");
+                let _ = writeln!(out, "<path class=\"p c{colour}\" d=\"{path}\"/>");
             }
             Shape::Thesis => {
                 let path =
                     places(frame, &curve.points).into_iter().map(|it| outline(style.mark, it, 4.2));
-                let _ = write!(
+                let _ = writeln!(
                     out,
-                    "<path class=\"w c{colour}\" d=\"{}\"/>\n",
+                    "<path class=\"w c{colour}\" d=\"{}\"/>",
                     path.collect::<String>()
                 );
             }
             Shape::Line => {
                 let path = line(frame, &curve.points, tolerance.0);
-                let _ = write!(out, "<path class=\"l c{colour}\" d=\"{path}\"/>\n");
+                let _ = writeln!(out, "<path class=\"l c{colour}\" d=\"{path}\"/>");
                 let marks = marks(&places(frame, &curve.points), nth);
                 let path = marks.into_iter().map(|it| outline(style.mark, it, 3.6));
                 out.push_str(&marked(style, &path.collect::<String>()));
@@ -200,9 +200,9 @@ fn draw_key(out: &mut String, key: &Key) {
     let (x, y) = (tenths(key.x), tenths(key.y));
     match key.leader {
         Some((from_x, from_y)) => {
-            let _ = write!(
+            let _ = writeln!(
                 out,
-                "<path class=\"h c{colour}\" d=\"M{} {}L{} {}\"/>\n",
+                "<path class=\"h c{colour}\" d=\"M{} {}L{} {}\"/>",
                 number(tenths(from_x)),
                 number(tenths(from_y)),
                 number(x - 60),
@@ -210,9 +210,9 @@ fn draw_key(out: &mut String, key: &Key) {
             );
         }
         None if key.shape == Shape::Line => {
-            let _ = write!(
+            let _ = writeln!(
                 out,
-                "<path class=\"l c{colour}\" d=\"M{} {}h16\"/>\n",
+                "<path class=\"l c{colour}\" d=\"M{} {}h16\"/>",
                 number(x - 80),
                 number(y)
             );
@@ -221,7 +221,7 @@ fn draw_key(out: &mut String, key: &Key) {
     }
     let path = outline(key.style.mark, (x, y), 3.6);
     if key.shape == Shape::Thesis {
-        let _ = write!(out, "<path class=\"w c{colour}\" d=\"{path}\"/>\n");
+        let _ = writeln!(out, "<path class=\"w c{colour}\" d=\"{path}\"/>");
     } else {
         out.push_str(&marked(key.style, &path));
     }

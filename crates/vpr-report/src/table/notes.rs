@@ -162,8 +162,14 @@ mod tests {
         ];
         let notes = notes(&cells);
         assert_eq!(notes.text(), "[1] median\n[2] few\n");
-        assert_eq!((notes.mark_of_column("x"), notes.mark(&cells[0])), (" [1]".into(), "".into()));
-        assert_eq!((notes.mark_of_column("y"), notes.mark(&cells[2])), ("".into(), " [2]".into()));
+        assert_eq!(
+            (notes.mark_of_column("x"), notes.mark(&cells[0])),
+            (" [1]".into(), String::new())
+        );
+        assert_eq!(
+            (notes.mark_of_column("y"), notes.mark(&cells[2])),
+            (String::new(), " [2]".into())
+        );
     }
 
     #[test]
