@@ -222,7 +222,7 @@ mod tests {
             Anchors::of_rows(map.poses().six_dof().unwrap(), &[(0..5).collect()]).unwrap();
         let targets = Targets::between(&anchors, 3).unwrap();
         let run = |batch, renormalise| {
-            let options = Options { batch, renormalise };
+            let options = Options { renormalise, batch };
             regressed(&map, &targets, &LinearInterpolation, options).unwrap().0
         };
         assert_eq!(run(1, false), run(7, false));

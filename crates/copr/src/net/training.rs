@@ -336,7 +336,9 @@ mod tests {
             if key == "net_regdesc.0.weight" {
                 // Rows of 3 + 7 inputs: the first and the last two of the relative pose.
                 for row in tensor.data.chunks_mut(10) {
-                    [3, 8, 9].into_iter().for_each(|at: usize| row[at] = -row[at]);
+                    for at in [3, 8, 9] {
+                        row[at] = -row[at];
+                    }
                 }
             }
             Some((key, tensor))

@@ -190,7 +190,7 @@ mod tests {
     fn linear(pose: &Pose) -> Vec<f32> {
         let p = pose.translation.vector;
         [1.0 + 2.0 * p.x - p.y + 0.5 * p.z, -3.0 + p.y, 4.0 * p.z]
-            .map(|value| super::super::narrow(value))
+            .map(super::super::narrow)
             .to_vec()
     }
 
