@@ -52,7 +52,7 @@ fn ties() -> sue::Result<()> {
                 let (found, broken) = shares(Population { wrong, tied, n_values }, 200, 0.1)?;
                 text.push(format!("{broken:.3} of {found:.3}"));
             }
-            println!("| .{tenths} | {n_values} | {} |", text.join(" | "));
+            println!("| {:.1} | {n_values} | {} |", f64::from(tenths) / 10.0, text.join(" | "));
         }
     }
     Ok(())

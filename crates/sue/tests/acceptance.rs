@@ -233,7 +233,20 @@ fn what_calibrate_writes_estimate_reads() {
     };
     refused("--threshold everything.json", &["calibrated for `l2`", "--estimator l2"]);
     refused("--threshold number.json", &["lambda was 5.0, is 350.0"]);
-    refused("--threshold number.json --lambda 5 --normalize", &["as they were", "--no-normalize"]);
+    // Scaled or of length 1 already is the same; other lengths are not.
+    road.lengthen();
+    let estimate = |more: &str| {
+        let more = format!("--estimator l2 --threshold everything.json {more}");
+        road.on("estimate", "long-map.npy", "long-queries.npy", &more)
+    };
+    success(&estimate("--normalize"));
+    let text = stderr(&estimate("--no-normalize"));
+    assert!(
+        text.contains("error: everything.json: calibrated with descriptors of length 1"),
+        "{text}"
+    );
+    fs::write(road.path("typo.json"), r#"{"threshold": 1, "estimator": "l3"}"#).unwrap();
+    refused("--threshold typo.json --estimator l2", &["typo.json", "`l3`"]);
     refused("--threshold all", &["all", "`everything`"]);
     refused("--threshold poses.csv", &["poses.csv", "calibrate --json"]);
     npy::write_f32(&road.path("v.npy"), Array2::from_elem((200, 1), 0.5).view()).unwrap();

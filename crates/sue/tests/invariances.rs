@@ -176,7 +176,9 @@ fn density_counts_distinct_positions() {
     let places = Places::from_poses(&retrieval, &poses).unwrap();
     let sue = sue(SueDefinition::Corrected, 1.0, 5);
     let distinct = DensityCompensatedSue::new(sue, &poses, 1, Density::Distinct).unwrap();
-    assert!(distinct.spacing().all(|z| (z - 100.0).abs() < 1e-9));
+    let spacing: Vec<f64> = distinct.spacing().collect();
+    assert_eq!(spacing.len(), 5);
+    assert!(spacing.iter().all(|z| (z - 100.0).abs() < 1e-9), "{spacing:?}");
     assert!(near(distinct.estimate(&places).unwrap()[0], sue.estimate(&places).unwrap()[0]));
     // As eq. 5.12 reads, z of every tile is 0 for k below 4 and only the lone place has weight.
     let plain = DensityCompensatedSue::new(sue, &poses, 1, Density::Plain).unwrap();

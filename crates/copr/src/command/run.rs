@@ -13,11 +13,12 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     let workspace_data = args.workspace_data();
     let sources = Sources::new([&*args.data.data, &workspace_data], &args.data.cache, &bar);
     let bare = Sources::new([], &args.data.cache, &bar);
+    let without = sources.without_weights()?;
     let mut outcome = Outcome::Success;
     for experiment in &experiments {
         let context = Context { sources: &sources, bare: &bare, seed: experiment.seed };
         let report = study::run(experiment, context)?;
-        outcome = outcome.and(cli::finish(experiment, &report, &args.output)?);
+        outcome = outcome.and(cli::finish(experiment, &report, &args.output, &without)?);
     }
     Ok(outcome)
 }

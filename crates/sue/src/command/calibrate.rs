@@ -70,11 +70,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
         cli::print(&format!("{words}\n"))?;
         return Ok(Outcome::Success);
     }
-    let origin = Origin {
-        estimator: args.estimator,
-        settings: input.settings,
-        normalized: input.normalized,
-    };
+    let origin = Origin::new(args.estimator, &input);
     let mut object = object;
     object["guarantee"] = words.into();
     for (key, value) in serde_json::to_value(origin)?.as_object().into_iter().flatten() {

@@ -70,7 +70,8 @@ pub(crate) fn run(args: &EstimateArgs) -> anyhow::Result<Outcome> {
     let is_npy = args.format == OutputFormat::Npy;
     ensure!(!is_npy || args.out.is_some(), "`--format npy` needs `--out`: it is no text");
     let input = args.input.open()?;
-    let origin = args.origin(&input);
+    // A threshold of an estimator says nothing about variances.
+    let origin = args.variances.is_none().then(|| Origin::new(args.estimator, &input));
     let threshold = args.threshold.as_ref().map(|it| it.open(origin.as_ref())).transpose()?;
     let variances = args.variances.as_deref().map(npy::read_f32).transpose()?;
     if let (Some(variances), Some(path)) = (&variances, &args.variances) {
@@ -115,12 +116,6 @@ pub(crate) fn run(args: &EstimateArgs) -> anyhow::Result<Outcome> {
 }
 
 impl EstimateArgs {
-    /// What a threshold must have been calibrated for; nothing is for variances.
-    fn origin(&self, input: &Input) -> Option<Origin> {
-        let (estimator, settings, normalized) = (self.estimator, input.settings, input.normalized);
-        self.variances.is_none().then_some(Origin { estimator, settings, normalized })
-    }
-
     /// Says so where most uncertainties are near 0 since one reference has all the weight. A
     /// threshold that was calibrated with them has seen that.
     fn warn_of_lone(&self, n_lone: usize, input: &Input) {

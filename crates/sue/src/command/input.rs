@@ -11,7 +11,7 @@ use vpr_core::{
 };
 use vpr_data::exchange::{self, Format, Parts};
 
-use super::normalization::{Measured, NormalizationArgs, unit_distance};
+use super::normalization::{Measured, NormalizationArgs, Scale, unit_distance};
 
 /// Map and queries, and what the estimators are told.
 #[derive(clap::Args)]
@@ -78,8 +78,8 @@ pub(crate) struct Input {
     pub(crate) about: About,
     /// What the estimators are told.
     pub(crate) settings: EstimatorSettings,
-    /// Whether descriptors are scaled to length 1.
-    pub(crate) normalized: bool,
+    /// How descriptors are compared.
+    pub(crate) scale: Scale,
     ranks: usize,
     batch_size: usize,
 }
@@ -193,7 +193,7 @@ impl InputArgs {
             Measured { path: &self.map, lengths: references.rows.lengths()? },
             Measured { path: &self.queries, lengths: queries.rows.lengths()? },
         ];
-        let normalized = self.normalization.decide(about.metric.unwrap_or_default(), &sides)?;
+        let scale = self.normalization.decide(about.metric.unwrap_or_default(), &sides)?;
         Ok(Input {
             references: references.rows,
             queries: queries.rows,
@@ -203,7 +203,7 @@ impl InputArgs {
             query_poses: queries.poses,
             about,
             settings: EstimatorSettings { sue, nth: self.nth },
-            normalized,
+            scale,
             ranks: self.ranks.max(self.k).max(2),
             batch_size: self.batch_size,
         })
@@ -226,7 +226,8 @@ impl Input {
         &self,
         mut then: impl FnMut(usize, &Retrieval) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        let metric = if self.normalized { Metric::Cosine } else { Metric::Euclidean };
+        let is_scaled = self.scale == Scale::ToUnit;
+        let metric = if is_scaled { Metric::Cosine } else { Metric::Euclidean };
         let params = SearchParams { metric, k: self.ranks, ..SearchParams::default() };
         for start in (0..self.n_queries()).step_by(self.batch_size) {
             let end = (start + self.batch_size).min(self.n_queries());
@@ -238,7 +239,7 @@ impl Input {
             let batch = Descriptors::new(rows)
                 .with_context(|| format!("queries {start} to {}", end - 1))?;
             let found = self.references.with(|source| knn::search(source, &batch, &params))?;
-            let found = if self.normalized { unit(&found)? } else { found };
+            let found = if is_scaled { unit(&found)? } else { found };
             then(start, &found)?;
         }
         Ok(())

@@ -21,6 +21,17 @@ pub(crate) struct NormalizationArgs {
     no_normalize: bool,
 }
 
+/// How descriptors are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Scale {
+    /// As they are: of length 1.
+    Unit,
+    /// Scaled to length 1.
+    ToUnit,
+    /// As they are: of other lengths.
+    Other,
+}
+
 /// A file of descriptors and how long they are.
 pub(super) struct Measured<'a> {
     pub(super) path: &'a Path,
@@ -28,10 +39,10 @@ pub(super) struct Measured<'a> {
 }
 
 impl NormalizationArgs {
-    /// Whether descriptors that were made for `metric` and have these lengths are scaled.
-    pub(super) fn decide(&self, metric: Metric, sides: &[Measured<'_>]) -> Result<bool> {
+    /// How descriptors that were made for `metric` and have these lengths are compared.
+    pub(super) fn decide(&self, metric: Metric, sides: &[Measured<'_>]) -> Result<Scale> {
         if self.normalize {
-            return Ok(true);
+            return Ok(Scale::ToUnit);
         }
         let is_cosine = metric == Metric::Cosine && !self.no_normalize;
         if metric != Metric::Euclidean && !is_cosine {
@@ -40,8 +51,11 @@ impl NormalizationArgs {
             return Err(Error::Parameter { name: "metric", value, reason }.into());
         }
         let long: Vec<String> = sides.iter().filter_map(not_unit).collect();
-        if long.is_empty() || is_cosine {
-            return Ok(is_cosine);
+        if is_cosine {
+            return Ok(Scale::ToUnit);
+        }
+        if long.is_empty() {
+            return Ok(Scale::Unit);
         }
         let long = long.join("; ");
         cli::note(&if self.no_normalize {
@@ -54,7 +68,7 @@ impl NormalizationArgs {
                  a warning, --no-normalize takes them as they are"
             )
         });
-        Ok(!self.no_normalize)
+        Ok(if self.no_normalize { Scale::Other } else { Scale::ToUnit })
     }
 }
 

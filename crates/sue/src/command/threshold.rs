@@ -6,6 +6,8 @@ use anyhow::{Context as _, bail};
 use serde::{Deserialize, Serialize};
 use sue::{EstimatorChoice, EstimatorSettings, Share, Threshold};
 
+use super::{input::Input, normalization::Scale};
+
 /// What was given for `--threshold`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum ThresholdArg {
@@ -16,22 +18,31 @@ pub(crate) enum ThresholdArg {
 }
 
 /// What a threshold belongs to: with anything else its promise is void.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Origin {
     /// The estimator whose uncertainties were looked at.
     pub(crate) estimator: EstimatorChoice,
     /// What it was told.
     pub(crate) settings: EstimatorSettings,
-    /// Whether descriptors were scaled to length 1.
+    /// Whether descriptors were compared at length 1, scaled or not.
     pub(crate) normalized: bool,
 }
 
-/// What is read of a file of `sue calibrate --json`.
+impl Origin {
+    /// The estimator on this input.
+    pub(crate) fn new(estimator: EstimatorChoice, input: &Input) -> Self {
+        Self { estimator, settings: input.settings, normalized: input.scale != Scale::Other }
+    }
+}
+
+/// What is read of a file of `sue calibrate --json`; a file of someone's own needs no more than the
+/// threshold.
 #[derive(Deserialize)]
 struct Calibration {
     threshold: Threshold,
-    #[serde(flatten)]
-    origin: Option<Origin>,
+    estimator: Option<EstimatorChoice>,
+    settings: Option<EstimatorSettings>,
+    normalized: Option<bool>,
 }
 
 impl FromStr for ThresholdArg {
@@ -59,21 +70,23 @@ impl ThresholdArg {
         })?;
         let read: Calibration = serde_json::from_str(&text)
             .with_context(|| format!("{shown}: not what `sue calibrate --json` writes"))?;
-        let Some(made) = read.origin else { return Ok(read.threshold) };
         let Some(now) = origin else {
-            bail!("{shown}: calibrated for `{}`, not for variances", name(made.estimator));
+            if let Some(made) = read.estimator {
+                bail!("{shown}: calibrated for `{}`, not for variances", name(made));
+            }
+            return Ok(read.threshold);
         };
-        if made.estimator != now.estimator {
-            let [made, now] = [made, now.clone()].map(|it| name(it.estimator));
+        if let Some(made) = read.estimator.filter(|&it| it != now.estimator) {
+            let [made, now] = [made, now.estimator].map(name);
             bail!("{shown}: calibrated for `{made}`, not for `{now}`: give --estimator {made}");
         }
         let is_spatial = now.estimator.needs().poses != Share::None;
-        if is_spatial && made.settings != now.settings {
-            let changes = changes(&made.settings, &now.settings)?;
+        if let Some(made) = read.settings.filter(|it| is_spatial && *it != now.settings) {
+            let changes = changes(&made, &now.settings)?;
             bail!("{shown}: calibrated with other settings: {changes}");
         }
-        if made.normalized != now.normalized {
-            let was = if made.normalized { "scaled to length 1" } else { "as they were" };
+        if let Some(made) = read.normalized.filter(|&it| it != now.normalized) {
+            let was = if made { "of length 1" } else { "of other lengths, as they were" };
             bail!("{shown}: calibrated with descriptors {was}; see --normalize and --no-normalize");
         }
         Ok(read.threshold)
