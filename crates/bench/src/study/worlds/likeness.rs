@@ -115,6 +115,8 @@ fn evenly(images: &[PathBuf], n: usize) -> Vec<PathBuf> {
     (0..n).map(|index| images[index * images.len() / n].clone()).collect()
 }
 
+/// All are measured, also those among generated sets: the components and the unit of length are those
+/// of all sets together, real ones among them.
 fn report(table: &mut Table, column: &str, clouds: &[Cloud]) {
     let scale = spread(clouds);
     let mut of_kind: [Vec<f64>; 3] = Default::default();
@@ -131,8 +133,6 @@ fn report(table: &mut Table, column: &str, clouds: &[Cloud]) {
     let kinds = ["real to real", "generated to generated", "real to generated"];
     for (kind, distances) in kinds.into_iter().zip(&of_kind) {
         let row = format!("likeness: Fréchet distance, {kind}");
-        // Also among generated sets: real images take part in what is compared.
-        let provenance = Provenance::Measured;
         if distances.is_empty() {
             table.push(Cell::absent(row, column, "fewer than two such sets at hand"));
             continue;
@@ -144,7 +144,7 @@ fn report(table: &mut Table, column: &str, clouds: &[Cloud]) {
         let note = format!(
             "mean over pairs of sets, {low:.3} to {high:.3}, in units of the pooled standard deviation"
         );
-        table.push(Cell::new(row, column, mean, provenance, distances.len()).noted(note));
+        table.push(Cell::new(row, column, mean, Provenance::Measured, distances.len()).noted(note));
     }
     let (share, chance) = same_kind(clouds);
     let n = clouds.iter().map(|cloud| cloud.points.nrows()).sum();
