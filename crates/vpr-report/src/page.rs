@@ -77,7 +77,8 @@ impl Report {
     ///
     /// Besides the cells (see [`check`]), the Markdown page must be the one that its CSV gives; a
     /// figure and a contact sheet must be those that would be written, as far as all their data is
-    /// at hand.
+    /// at hand. `without` names methods whose weights are not, as rows and columns call them: their cells
+    /// are counted as not at hand.
     ///
     /// # Errors
     ///

@@ -115,6 +115,8 @@ fn evenly(images: &[PathBuf], n: usize) -> Vec<PathBuf> {
     (0..n).map(|index| images[index * images.len() / n].clone()).collect()
 }
 
+/// All are measured, also those among generated sets: the components and the unit of length are those
+/// of all sets together, real ones among them.
 fn report(table: &mut Table, column: &str, clouds: &[Cloud]) {
     let scale = spread(clouds);
     let mut of_kind: [Vec<f64>; 3] = Default::default();
@@ -131,8 +133,6 @@ fn report(table: &mut Table, column: &str, clouds: &[Cloud]) {
     let kinds = ["real to real", "generated to generated", "real to generated"];
     for (kind, distances) in kinds.into_iter().zip(&of_kind) {
         let row = format!("likeness: Fréchet distance, {kind}");
-        let provenance =
-            if kind == "real to real" { Provenance::Measured } else { Provenance::Generated };
         if distances.is_empty() {
             table.push(Cell::absent(row, column, "fewer than two such sets at hand"));
             continue;
@@ -144,7 +144,7 @@ fn report(table: &mut Table, column: &str, clouds: &[Cloud]) {
         let note = format!(
             "mean over pairs of sets, {low:.3} to {high:.3}, in units of the pooled standard deviation"
         );
-        table.push(Cell::new(row, column, mean, provenance, distances.len()).noted(note));
+        table.push(Cell::new(row, column, mean, Provenance::Measured, distances.len()).noted(note));
     }
     let (share, chance) = same_kind(clouds);
     let n = clouds.iter().map(|cloud| cloud.points.nrows()).sum();
@@ -152,7 +152,7 @@ fn report(table: &mut Table, column: &str, clouds: &[Cloud]) {
         "of images whose nearest neighbour in another set is of their own kind, real or generated; {chance:.3} if kinds could not be told apart"
     );
     let row = "likeness: share told apart by the nearest other set";
-    table.push(Cell::new(row, column, share, Provenance::Generated, n).noted(note));
+    table.push(Cell::new(row, column, share, Provenance::Measured, n).noted(note));
 }
 
 /// Root of the total variance of all points together.

@@ -237,7 +237,7 @@ impl Hnsw {
         let mut file = NewFile::create(path)?;
         file.file().write_all(&bytes).map_err(Error::io(path))?;
         file.commit()?;
-        replace(&description_of(path), &sidecar.to_json())
+        Ok(replace(&description_of(path), &sidecar.to_json())?)
     }
 
     /// Maps what [`Self::save`] wrote; the file is read once to check its digest, because `USearch`
