@@ -22,7 +22,6 @@ use vpr_files::npy;
 /// Places along a road, 5 m apart, and queries in front of them.
 struct Road {
     folder: TempDir,
-    n: usize,
 }
 
 /// Rows that look alike where places are near; `shift` moves along the road.
@@ -34,11 +33,12 @@ fn rows(n: usize, shift: f32) -> Array2<f32> {
 
 impl Road {
     fn new(n: usize) -> Self {
-        let road = Self { folder: tempfile::tempdir().unwrap(), n };
+        let road = Self { folder: tempfile::tempdir().unwrap() };
         road.write("map.npy", &Descriptors::new(rows(n, 0.0)).unwrap().normalized());
         road.write("queries.npy", &Descriptors::new(rows(n, 0.3)).unwrap().normalized());
-        let lines = (0..n).map(|i| format!("{i},{},0\n", 5 * i)).collect::<String>();
-        fs::write(road.path("poses.csv"), "name,easting,northing\n".to_owned() + &lines).unwrap();
+        let lines: Vec<String> = (0..n).map(|i| format!("{i},{},0\n", 5 * i)).collect();
+        fs::write(road.path("poses.csv"), "name,easting,northing\n".to_owned() + &lines.concat())
+            .unwrap();
         road
     }
 
