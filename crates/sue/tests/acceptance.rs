@@ -36,8 +36,9 @@ impl Road {
         let road = Self { folder: tempfile::tempdir().unwrap() };
         road.write("map.npy", &Descriptors::new(rows(n, 0.0)).unwrap().normalized());
         road.write("queries.npy", &Descriptors::new(rows(n, 0.3)).unwrap().normalized());
-        let lines = (0..n).map(|i| format!("{i},{},0\n", 5 * i)).collect::<String>();
-        fs::write(road.path("poses.csv"), "name,easting,northing\n".to_owned() + &lines).unwrap();
+        let lines: Vec<String> = (0..n).map(|i| format!("{i},{},0\n", 5 * i)).collect();
+        fs::write(road.path("poses.csv"), "name,easting,northing\n".to_owned() + &lines.concat())
+            .unwrap();
         road
     }
 
@@ -150,10 +151,8 @@ fn descriptors_that_stay_long_are_warned_of() {
     assert!(distances.iter().all(|&it| it > 0.1), "{distances:?}");
     let quiet = road.on("estimate", "map.npy", "queries.npy", "--lambda 1");
     assert_eq!(stderr(&quiet), "");
-    assert_refused(
-        &road.on("estimate", "map.npy", "queries.npy", "--normalize --no-normalize"),
-        &[],
-    );
+    let both = road.on("estimate", "map.npy", "queries.npy", "--normalize --no-normalize");
+    assert_eq!(both.status.code(), Some(2));
 }
 
 #[test]
@@ -196,43 +195,47 @@ fn right_matches_of_equal_uncertainty_are_accepted() {
 #[test]
 fn what_calibrate_writes_estimate_reads() {
     let road = Road::new(200);
-    let save = |name: &str, more: &str| {
-        let json =
-            success(&road.on("calibrate", "map.npy", "queries.npy", &format!("--json {more}")));
+    // Half of the queries are where the map says, the others look away from everything.
+    let mut values = npy::read_f32(&road.path("map.npy")).unwrap();
+    for mut row in values.outer_iter_mut().skip(1).step_by(2) {
+        row.mapv_inplace(|it| -it);
+    }
+    npy::write_f32(&road.path("mixed.npy"), values.view()).unwrap();
+    let save = |name: &str, queries: &str, more: &str| {
+        let more = format!("--json {more}");
+        let json = success(&road.on("calibrate", "map.npy", queries, &more));
         fs::write(road.path(name), &json).unwrap();
         serde_json::from_str::<Value>(&json).unwrap()
     };
     let accepted = |threshold: &str, more: &str| {
-        let csv = success(&road.on(
-            "estimate",
-            "map.npy",
-            "queries.npy",
-            &format!("--threshold {threshold} {more}"),
-        ));
+        let more = format!("--threshold {threshold} {more}");
+        let csv = success(&road.on("estimate", "map.npy", "mixed.npy", &more));
         csv.lines().filter(|line| line.ends_with(",true")).count()
     };
-    let everything = save("everything.json", "--estimator l2");
+    let everything = save("everything.json", "map.npy", "--estimator l2");
     assert_eq!(everything["threshold"], "everything");
     for given in ["everything.json", "@everything.json", "everything", "inf"] {
         assert_eq!(accepted(given, "--estimator l2"), 200, "{given}");
     }
-    let nothing = save("nothing.json", "--estimator l2 --precision 0.999");
+    let nothing = save("nothing.json", "map.npy", "--estimator l2 --precision 0.999");
     assert_eq!(nothing["threshold"], "nothing");
     assert_eq!(accepted("nothing.json", "--estimator l2"), 0);
     assert_eq!(accepted("nothing", "--estimator l2"), 0);
 
-    let number = save("number.json", "--estimator sue --lambda 5");
-    fs::write(road.path("one.json"), r#"{"threshold": 0.01}"#).unwrap();
-    let of_number = accepted("number.json", "--lambda 5");
-    assert_eq!(of_number as u64, number["n_accepted"].as_u64().unwrap());
-    let some = accepted("one.json", "--estimator l2");
-    assert_eq!(some, accepted("0.01", "--estimator l2"));
+    let number = save("number.json", "mixed.npy", "--estimator l2");
+    assert!(number["threshold"].as_f64().is_some_and(|it| it > 0.0), "{number}");
+    assert_eq!(number["n_accepted"], 100);
+    assert_eq!(accepted("number.json", "--estimator l2"), 100);
+    fs::write(road.path("own.json"), r#"{"threshold": 1e-9}"#).unwrap();
+    assert_eq!(accepted("own.json", "--estimator l2"), 100);
+    assert_eq!(accepted("1e-9", "--estimator l2"), 100);
+    save("lambda.json", "map.npy", "--lambda 5");
 
     let refused = |arguments: &str, parts: &[&str]| {
         assert_refused(&road.on("estimate", "map.npy", "queries.npy", arguments), parts);
     };
     refused("--threshold everything.json", &["calibrated for `l2`", "--estimator l2"]);
-    refused("--threshold number.json", &["lambda was 5.0, is 350.0"]);
+    refused("--threshold lambda.json", &["lambda was 5.0, is 350.0"]);
     // Scaled or of length 1 already is the same; other lengths are not.
     road.lengthen();
     let estimate = |more: &str| {
@@ -250,7 +253,7 @@ fn what_calibrate_writes_estimate_reads() {
     refused("--threshold all", &["all", "`everything`"]);
     refused("--threshold poses.csv", &["poses.csv", "calibrate --json"]);
     npy::write_f32(&road.path("v.npy"), Array2::from_elem((200, 1), 0.5).view()).unwrap();
-    refused("--variances v.npy --threshold number.json", &["not for variances"]);
+    refused("--variances v.npy --threshold lambda.json", &["not for variances"]);
 }
 
 #[test]

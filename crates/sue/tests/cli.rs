@@ -27,7 +27,7 @@ const N: usize = 12;
 fn descriptors(n: usize, shift: f32) -> Descriptors {
     let of = |(row, column): (usize, usize)| {
         // Places 0 and 6, 1 and 7, … look alike.
-        let angle = (row % 6) as f32 + shift * (1.0 + row as f32 / 10.0);
+        let angle = (1 + row % 6) as f32 + shift * (1.0 + row as f32 / 10.0);
         (angle * (1 + column) as f32).sin()
     };
     Descriptors::new(Array2::from_shape_fn((n, 4), of)).unwrap().normalized()

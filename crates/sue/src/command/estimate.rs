@@ -82,15 +82,12 @@ pub(crate) fn run(args: &EstimateArgs) -> anyhow::Result<Outcome> {
     let mut sink = Sink { text: String::new(), keep: args.out.is_some() };
     let (mut all, mut n_lone) = (Vec::new(), 0);
     input.each_batch(|first, retrieval| {
-        let uncertainty = match &variances {
-            Some(values) => {
-                let rows = values.slice(ndarray::s![first..first + retrieval.len(), ..]);
-                Variance::named("variance").estimate(&Variances::new(rows)?)?
-            }
-            None => {
-                n_lone += prepared.n_lone(retrieval);
-                prepared.estimate(retrieval)?
-            }
+        let uncertainty = if let Some(values) = &variances {
+            let rows = values.slice(ndarray::s![first..first + retrieval.len(), ..]);
+            Variance::named("variance").estimate(&Variances::new(rows)?)?
+        } else {
+            n_lone += prepared.n_lone(retrieval);
+            prepared.estimate(retrieval)?
         };
         if is_npy {
             all.extend(&uncertainty);
