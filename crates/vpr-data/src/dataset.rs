@@ -57,7 +57,8 @@ impl Dataset {
     fn open_vpr_bench(entry: &DatasetEntry, folder: &Path) -> Result<Self> {
         let queries = image_folder(&folder.join("query"))?;
         let references = image_folder(&folder.join("ref"))?;
-        let file = GroundTruthFile::read(&folder.join("ground_truth_new.npy"))?;
+        let path = folder.join("ground_truth_new.npy");
+        let (file, _) = GroundTruthFile::read_for(&path, queries.len(), references.len())?;
         if file.len() != queries.len() {
             let reason = format!("{}, but query/ has {} images", file.len(), queries.len());
             return Err(Error::format(file.path, "number of rows", reason));

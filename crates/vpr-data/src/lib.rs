@@ -17,12 +17,13 @@ pub mod exchange;
 pub mod layout;
 pub mod manifest;
 mod open;
+pub mod truth;
 pub mod validate;
 
 pub use dataset::Dataset;
 pub use manifest::{DataRoots, DatasetEntry, Layout, Manifest, Tolerance};
 pub use open::{Datasets, Generator};
-pub use validate::{Problem, Severity, validate};
+pub use validate::{Problem, Severity, validate, validate_with};
 
 /// The examples of the README, as tests.
 #[cfg(doctest)]

@@ -6,10 +6,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::layout::{
-    seven_scenes,
-    utm_names::{UtmFolder, parse_name},
-    vpr_bench::{GroundTruthFile, image_number, is_image},
+use crate::{
+    layout::{
+        numbered::images_in_order,
+        seven_scenes,
+        utm_names::{UtmFolder, parse_name},
+        vpr_bench::{GroundTruthFile, image_number, is_image},
+    },
+    truth::{self, Source},
 };
 use vpr_core::{Error, Result};
 
@@ -56,10 +60,22 @@ impl fmt::Display for Problem {
 /// `ground_truth_new.npy`) or of positions in names (`queries/`, `database/`).
 #[must_use]
 pub fn validate(folder: &Path, probe: Probe<'_>) -> Vec<Problem> {
+    validate_with(folder, probe, None)
+}
+
+/// [`validate`] with a truth from elsewhere: that is checked, and neither a ground truth in the folder
+/// nor positions in names are asked for.
+#[must_use]
+pub fn validate_with(folder: &Path, probe: Probe<'_>, truth: Option<&Source>) -> Vec<Problem> {
     let mut report = Report { problems: Vec::new(), probe };
     let has = |name: &str| folder.join(name).exists();
     if !folder.is_dir() {
         report.error(folder, "", "is not a folder");
+    } else if let (Some(truth), Some(sides)) = (truth, sides(folder)) {
+        let [queries, references] = sides.map(|name| folder.join(name));
+        report.plain_images(&queries);
+        report.plain_images(&references);
+        report.problems.extend(truth::problems(truth, &queries, &references));
     } else if has("queries") || has("database") {
         report.utm_names(&folder.join("queries"));
         report.utm_names(&folder.join("database"));
@@ -74,6 +90,12 @@ pub fn validate(folder: &Path, probe: Probe<'_>) -> Vec<Problem> {
         report.error(folder, "", reason);
     }
     report.problems
+}
+
+/// The folders of queries and references, if there are any that are called so.
+fn sides(folder: &Path) -> Option<[&'static str; 2]> {
+    let known = [["queries", "database"], ["query", "ref"]];
+    known.into_iter().find(|names| names.iter().any(|name| folder.join(name).is_dir()))
 }
 
 struct Report<'a> {
@@ -146,6 +168,14 @@ impl Report<'_> {
         let images: Vec<PathBuf> = numbered.into_values().flatten().collect();
         self.images(folder, &images);
         images.len()
+    }
+
+    /// Checks the images of a folder, whatever they are called.
+    fn plain_images(&mut self, folder: &Path) {
+        // A folder that cannot be listed is the truth's problem.
+        if let Ok(images) = images_in_order(folder) {
+            self.images(folder, &images);
+        }
     }
 
     /// Checks `queries/` or `database/`.
@@ -222,8 +252,13 @@ impl Report<'_> {
     }
 
     fn ground_truth(&mut self, path: &Path, n_queries: usize, n_references: usize) {
-        let file = match GroundTruthFile::read(path) {
-            Ok(file) => file,
+        let file = match GroundTruthFile::read_for(path, n_queries, n_references) {
+            Ok((file, notes)) => {
+                for note in notes {
+                    self.warning(path, "", note);
+                }
+                file
+            }
             Err(err) => return self.failure(path, err),
         };
         if file.len() != n_queries {

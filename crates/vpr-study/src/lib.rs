@@ -31,6 +31,8 @@ mod store;
 mod stored;
 mod subject;
 pub mod technique;
+#[cfg(feature = "cli")]
+mod truth;
 pub mod verification;
 
 pub use describe::{Describe, Features, Matched};
@@ -46,6 +48,8 @@ pub use store::Store;
 pub use stored::Stored;
 pub use subject::Subject;
 pub use technique::{Runner, Technique};
+#[cfg(feature = "cli")]
+pub use truth::TruthArgs;
 
 /// The examples of the README, as tests.
 #[cfg(doctest)]

@@ -45,8 +45,9 @@ pub(crate) struct EncodeArgs {
 }
 
 pub(crate) fn run(args: &EncodeArgs) -> anyhow::Result<Outcome> {
+    check_place(&args.out)?;
     let images = images(args)?;
-    let encoder = args.encoder.open(&args.method, &args.data.data)?;
+    let encoder = args.encoder.open(&args.method, &args.data.folders())?;
     let options = args.encoder.options(args.threads, args.skip_bad);
     let bar = cli::progress(encoder.name(), images.paths.len());
     let written =
@@ -69,6 +70,20 @@ pub(crate) fn run(args: &EncodeArgs) -> anyhow::Result<Outcome> {
         encoder.dimension()
     ));
     Ok(Outcome::Success)
+}
+
+/// A map is written where none is, into a folder that is there: known before the work.
+fn check_place(out: &Path) -> anyhow::Result<()> {
+    if out.exists() {
+        anyhow::bail!("{}: exists; delete it or choose another `--out`", out.display());
+    }
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match folder {
+        Some(folder) if !folder.is_dir() => {
+            anyhow::bail!("{}: the folder does not exist", folder.display())
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The images of the folder in the order of their numbers, or else of their paths.

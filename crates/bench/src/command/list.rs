@@ -1,6 +1,6 @@
 //! `bench list`: techniques, datasets, metrics.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 use vpr_core::metrics::catalogue::CATALOGUE;
@@ -31,7 +31,8 @@ pub(crate) fn run(args: &ListArgs) -> anyhow::Result<Outcome> {
     let lines = match args.what {
         What::Techniques => techniques(),
         What::Datasets => {
-            datasets(&Sources::new([&*args.data.data, Path::new("data")], &args.data.cache, &()))?
+            let (folders, cache) = (args.data.folders(), args.data.cache());
+            datasets(&Sources::new(folders.iter().map(PathBuf::as_path), &cache, &()))?
         }
         What::Metrics => metrics(),
     };

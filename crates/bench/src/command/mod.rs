@@ -7,6 +7,7 @@ pub(crate) mod encode;
 #[cfg(feature = "networks")]
 mod encoder;
 pub(crate) mod evaluate;
+mod input;
 pub(crate) mod list;
 mod log_folder;
 pub(crate) mod map;
@@ -15,6 +16,7 @@ pub(crate) mod match_images;
 pub(crate) mod methods;
 mod named;
 pub(crate) mod predictions;
+mod result;
 mod retrieved;
 pub(crate) mod run;
 pub(crate) mod validate;

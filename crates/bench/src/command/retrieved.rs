@@ -1,6 +1,6 @@
 //! What was retrieved for two sets of images or rows.
 
-use vpr_core::{Descriptors, GroundTruth, Ranking, retrieve};
+use vpr_core::{Descriptors, Ranking, retrieve};
 
 use super::named::Named;
 
@@ -15,8 +15,6 @@ pub(super) struct Retrieved {
     pub(super) confidence: Vec<f64>,
     /// Query and reference vectors, for techniques that have one per image.
     pub(super) descriptors: Option<(Descriptors, Descriptors)>,
-    /// The truth that came with the images.
-    pub(super) truth: Option<GroundTruth>,
 }
 
 impl Retrieved {
@@ -27,8 +25,7 @@ impl Retrieved {
         confidence: Vec<f64>,
         descriptors: Option<(Descriptors, Descriptors)>,
     ) -> Self {
-        let (alone, truth) = (None, None);
-        Self { queries, references, ranking, alone, confidence, descriptors, truth }
+        Self { queries, references, ranking, alone: None, confidence, descriptors }
     }
 }
 

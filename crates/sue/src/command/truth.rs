@@ -2,47 +2,42 @@
 
 use std::path::PathBuf;
 
-use anyhow::{bail, ensure};
-use vpr_core::GroundTruth;
-use vpr_data::layout::vpr_bench::GroundTruthFile;
+use anyhow::bail;
+use vpr_core::{GroundTruth, map::Names};
+use vpr_data::truth::{Side, Sides};
 use vpr_report::cli;
 
 use super::input::{Input, poses_of};
 
-/// Positions with a radius, or lists.
+/// Positions with a radius, or any other truth.
 #[derive(clap::Args)]
+#[group(skip)]
 pub(crate) struct TruthArgs {
     /// Poses of the queries, if their descriptors did not come with them
-    #[arg(long, value_name = "PATH", conflicts_with = "ground_truth")]
+    #[arg(long, value_name = "PATH")]
     query_poses: Option<PathBuf>,
-    /// Correct references per query, VPR-Bench's `ground_truth_new.npy`; instead of positions
-    #[arg(long, alias = "ground_truth", value_name = "NPY")]
-    ground_truth: Option<PathBuf>,
-    /// A reference is correct within this many metres, the limit included
-    #[arg(long, alias = "positive_dist_threshold", default_value_t = 25.0, value_name = "M")]
-    positive_dist_threshold: f64,
+    #[command(flatten)]
+    other: vpr_study::TruthArgs,
 }
 
 impl TruthArgs {
     /// The correct references of every query.
     pub(crate) fn truth(&self, input: &Input) -> anyhow::Result<GroundTruth> {
-        let (n_queries, n_references) = (input.n_queries(), input.n_references());
-        if let Some(path) = &self.ground_truth {
-            let file = GroundTruthFile::read(path)?;
-            let n = file.len();
-            ensure!(n == n_queries, "{}: {n} rows for {n_queries} queries", path.display());
-            let (truth, n_clamped) = file.truth(n_references)?;
-            if n_clamped > 0 {
-                let path = path.display();
-                cli::note(&format!(
-                    "warning: {path}: {n_clamped} entries point past the {n_references} references and are dropped"
-                ));
-            }
-            return Ok(truth);
-        }
         let given = self.query_poses.as_ref();
-        let given =
-            given.map(|path| poses_of(path, input.query_names.as_ref(), n_queries)).transpose()?;
+        let given = given
+            .map(|path| poses_of(path, input.query_names.as_ref(), input.n_queries()))
+            .transpose()?;
+        if let Some(source) = self.other.source() {
+            let sides = Sides {
+                queries: side(input.n_queries(), input.query_names.as_ref()),
+                references: side(input.n_references(), input.names.as_ref()),
+            };
+            let found = source.truth(&sides)?;
+            for note in &found.notes {
+                cli::note(&format!("note: {note}"));
+            }
+            return Ok(found.truth);
+        }
         if let (Some((_, Some(queries))), Some(map)) = (&given, &input.about.coordinates)
             && queries != map
         {
@@ -51,8 +46,20 @@ impl TruthArgs {
         }
         let queries = given.map(|it| it.0).or_else(|| input.query_poses.clone());
         let (Some(queries), Some(references)) = (queries, &input.poses) else {
-            bail!("no positions: give --map-poses and --query-poses, or --ground-truth");
+            bail!(
+                "no positions: give --map-poses and --query-poses, or --ground-truth, --labels or \
+                 --same-index"
+            );
         };
-        Ok(GroundTruth::within_radius(&queries, references, self.positive_dist_threshold)?)
+        let radius = self.other.positive_dist_threshold;
+        Ok(GroundTruth::within_radius(&queries, references, radius)?)
+    }
+}
+
+/// What a truth is told of one side.
+fn side(n: usize, names: Option<&Names>) -> Side {
+    match names {
+        Some(names) if names.len() == n => Side::named(names.iter().map(str::to_owned).collect()),
+        _ => Side::numbered(n),
     }
 }

@@ -22,8 +22,7 @@ pub(super) fn read(path: &Path) -> Read<Parts> {
 
 /// A matrix of f32, or one of f64 that is narrowed.
 pub(super) fn read_descriptors(path: &Path) -> Result<Descriptors> {
-    let values =
-        npy::read_f32(path).or_else(|first| npy::read_f32_narrowed(path).map_err(|_| first))?;
+    let values = npy::read_f32_rounded(path)?.0;
     Descriptors::new(values)
 }
 
