@@ -150,7 +150,8 @@ impl RunArgs {
         let experiments = self.experiments.iter().map(open).collect::<anyhow::Result<_>>()?;
         let data = &self.data.data;
         // The usual name is looked for beside the experiment as well.
-        if !data.is_dir() && !(data == Path::new(DATA) && self.workspace_data().is_dir()) {
+        let is_beside = data == Path::new(DATA) && self.workspace_data().is_dir();
+        if !(data.is_dir() || is_beside) {
             bail!("{}: the data folder does not exist", data.display());
         }
         Ok(experiments)

@@ -33,7 +33,8 @@ pub(super) fn lists(
     }
     let alike = readings.windows(2).all(|pair| normal(&pair[0].1) == normal(&pair[1].1));
     let is_text = said.lines.is_some();
-    if !alike && !(is_text && forms == [Form::Pairs, Form::Lists]) {
+    let is_usual = is_text && forms == [Form::Pairs, Form::Lists];
+    if !(alike || is_usual) {
         let forms: Vec<_> = forms.iter().map(|form| form.name()).collect();
         let reason = format!("could be {}: say which with `--truth-form`", forms.join(" or "));
         return Err(task.err(said.whole(), reason));

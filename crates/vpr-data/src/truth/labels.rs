@@ -211,8 +211,8 @@ fn columns(path: &Path, fields: &[String], asked: Option<&str>) -> Result<Column
 
 /// The labels of one side: by name where both have names, in order otherwise.
 fn of_one(path: &Path, rows: &[Row], side: &Side, what: &str) -> Result<Vec<String>> {
-    let named = rows.iter().all(|row| row.name.is_some());
-    let (true, Some(names)) = (named, &side.names) else {
+    let are_named = rows.iter().all(|row| row.name.is_some());
+    let (true, Some(names)) = (are_named, &side.names) else {
         if rows.len() != side.len {
             let reason = format!("{} labels, but there are {} {what}", rows.len(), side.len);
             return Err(Error::format(path, "number of labels", reason));
