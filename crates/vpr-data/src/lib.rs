@@ -18,11 +18,13 @@ pub mod layout;
 pub mod manifest;
 mod open;
 pub mod validate;
+mod zone;
 
 pub use dataset::Dataset;
 pub use manifest::{DataRoots, DatasetEntry, Layout, Manifest, Tolerance};
 pub use open::{Datasets, Generator};
 pub use validate::{Problem, Severity, validate};
+pub use zone::ZoneChoice;
 
 /// The examples of the README, as tests.
 #[cfg(doctest)]

@@ -7,6 +7,7 @@ use std::{
 };
 
 use crate::layout::{
+    folder::{images_of, is_hidden},
     seven_scenes,
     utm_names::{UtmFolder, parse_name},
     vpr_bench::{GroundTruthFile, image_number, is_image},
@@ -121,6 +122,10 @@ impl Report<'_> {
     fn numbered_images(&mut self, folder: &Path) -> usize {
         let mut numbered: BTreeMap<u64, Vec<PathBuf>> = BTreeMap::new();
         for path in self.entries(folder) {
+            if !is_image(&path) {
+                self.warning(&path, "", "is no .jpg, .jpeg or .png image, and not looked at");
+                continue;
+            }
             match image_number(&path) {
                 Ok(number) => numbered.entry(number).or_default().push(path),
                 Err(reason) => self.error(&path, "", reason),
@@ -160,6 +165,9 @@ impl Report<'_> {
                 if sorted.len() > 1 && sorted[0] == sorted[sorted.len() - 1] {
                     self.warning(folder, "", "all images have the same position");
                 }
+                for note in &opened.notes {
+                    self.warning(folder, "", note);
+                }
                 self.images(folder, &opened.images);
             }
             Err(Error::Format { path, .. }) if is_image(&path) => self.names_below(folder),
@@ -167,16 +175,16 @@ impl Report<'_> {
         }
     }
 
-    /// Names every file whose name has no position.
+    /// Names every image whose name has no position.
     fn names_below(&mut self, folder: &Path) {
-        for path in self.entries(folder) {
-            if path.is_dir() {
-                self.names_below(&path);
-            } else if is_image(&path) {
-                match parse_name(&path) {
-                    Ok(_) => self.images(folder, &[path]),
-                    Err(reason) => self.error(&path, "file name", reason),
-                }
+        let listing = match images_of(folder) {
+            Ok(listing) => listing,
+            Err(err) => return self.failure(folder, err),
+        };
+        for image in listing.images {
+            match parse_name(&image) {
+                Ok(_) => self.images(folder, &[image]),
+                Err(reason) => self.error(&image, "file name", reason),
             }
         }
     }
@@ -192,9 +200,6 @@ impl Report<'_> {
                 self.error(folder, "", cause.to_string());
                 return Vec::new();
             }
-        };
-        let is_hidden = |path: &PathBuf| {
-            path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
         };
         paths.retain(|path| !is_hidden(path));
         paths.sort();

@@ -4,13 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use vpr_core::{
-    Descriptors, GroundTruth, Observer as _, Ranking,
+    GroundTruth, Observer as _, Ranking,
     metrics::{Positives, auc_pr, recall_at},
 };
 use vpr_data::layout::vpr_bench::GroundTruthFile;
-use vpr_files::npy;
 use vpr_report::cli::{self, Bar, DataArgs, Outcome};
-use vpr_study::{Runner, Sources, technique::hand_crafted};
+use vpr_study::{Runner, Sources, reading::ReadingArgs, technique::hand_crafted};
 
 #[cfg(feature = "networks")]
 use super::{
@@ -34,7 +33,8 @@ pub(crate) struct EvaluateArgs {
         conflicts_with_all = ["database_folder", "database_descriptors", "ground_truth"]
     )]
     dataset: Option<String>,
-    /// Folder of the reference images, with `@utm_east@utm_north@…` names
+    /// Folder of the reference images; their positions are those of --database-poses, or of
+    /// `@utm_east@utm_north@…` names
     #[arg(long, alias = "database_folder", value_name = "DIR", requires = "queries_folder")]
     database_folder: Option<PathBuf>,
     /// Folder of the query images
@@ -48,7 +48,7 @@ pub(crate) struct EvaluateArgs {
     encoder: EncoderArgs,
     #[command(flatten)]
     data: DataArgs,
-    /// Descriptors of the references, one row each: .npy, float32
+    /// Descriptors of the references, one row each: .npy, or any format of docs/formats.md
     #[arg(
         long,
         alias = "database_descriptors",
@@ -65,12 +65,15 @@ pub(crate) struct EvaluateArgs {
         requires = "database_descriptors"
     )]
     queries_descriptors: Option<PathBuf>,
-    /// Poses of the references: CSV with a header
-    #[arg(long, alias = "database_poses", value_name = "CSV", requires = "queries_poses")]
+    /// Poses of the references: a table, or any format of docs/formats.md; by name if both files
+    /// have names, by order otherwise
+    #[arg(long, alias = "database_poses", value_name = "PATH", requires = "queries_poses")]
     database_poses: Option<PathBuf>,
     /// Poses of the queries
-    #[arg(long, alias = "queries_poses", value_name = "CSV", requires = "database_poses")]
+    #[arg(long, alias = "queries_poses", value_name = "PATH", requires = "database_poses")]
     queries_poses: Option<PathBuf>,
+    #[command(flatten)]
+    reading: ReadingArgs,
     /// Correct references per query, VPR-Bench's `ground_truth_new.npy`; instead of positions
     #[arg(long, alias = "ground_truth", value_name = "NPY", conflicts_with = "database_poses")]
     ground_truth: Option<PathBuf>,
@@ -134,6 +137,11 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
 }
 
 impl EvaluateArgs {
+    /// Whether what is correct follows from positions.
+    fn needs_positions(&self) -> bool {
+        !self.no_labels && self.ground_truth.is_none()
+    }
+
     /// What is saved, and where.
     fn saving(&self) -> Saving<'_> {
         Saving {
@@ -172,9 +180,11 @@ fn from_folders(
     references: &Path,
     k: usize,
 ) -> anyhow::Result<Retrieved> {
-    let needs_positions = !args.no_labels && args.ground_truth.is_none();
-    let queries = Named::folder(queries, needs_positions)?;
-    let references = Named::folder(references, needs_positions)?;
+    let named = |folder: &Path, poses: &Option<PathBuf>| {
+        Named::folder(folder, poses.as_deref(), args.reading.poses, args.needs_positions())
+    };
+    let queries = named(queries, &args.queries_poses)?;
+    let references = named(references, &args.database_poses)?;
     match_images(args, queries, references, k)
 }
 
@@ -184,8 +194,9 @@ fn from_dataset(args: &EvaluateArgs, id: &str, k: usize) -> anyhow::Result<Retri
     let sources = Sources::new([&*args.data.data, Path::new("data")], &args.data.cache, &bar);
     let Some(dataset) = sources.images(id)? else { bail!(sources.why_absent(id, "images")?) };
     let (query_poses, reference_poses) = dataset.poses.clone().unzip();
-    let named =
-        |names: &[PathBuf], poses| Named { names: names.to_vec(), poses, zone: String::new() };
+    let named = |names: &[PathBuf], poses| {
+        Named { names: names.to_vec(), poses, coordinates: None, place: PathBuf::from(id) }
+    };
     let queries = named(&dataset.queries, query_poses);
     let references = named(&dataset.references, reference_poses);
     let retrieved = match_images(args, queries, references, k)?;
@@ -239,16 +250,11 @@ fn from_descriptors(args: &EvaluateArgs, k: usize) -> anyhow::Result<Retrieved> 
             "give --dataset, --database-folder and --queries-folder, or --database-descriptors and --queries-descriptors"
         );
     };
-    let read = |path: &PathBuf| -> anyhow::Result<Descriptors> {
-        Descriptors::new(npy::read_f32(path)?).with_context(|| path.display().to_string())
+    let read = |rows: &Path, poses: &Option<PathBuf>| {
+        Named::rows(rows, poses.as_deref(), args.reading, args.needs_positions())
     };
-    let (query_rows, reference_rows) = (read(queries)?, read(references)?);
-    let named = |poses: &Option<PathBuf>, rows: &Descriptors| match poses {
-        Some(path) => Named::poses(path, rows.len()),
-        None => Ok(Named::numbered(rows.len())),
-    };
-    let (named_queries, named_references) =
-        (named(&args.queries_poses, &query_rows)?, named(&args.database_poses, &reference_rows)?);
+    let (named_queries, query_rows) = read(queries, &args.queries_poses)?;
+    let (named_references, reference_rows) = read(references, &args.database_poses)?;
     nearest(named_queries, named_references, query_rows, reference_rows, k)
         .with_context(|| format!("{} and {}", queries.display(), references.display()))
 }
@@ -280,11 +286,6 @@ fn truth(args: &EvaluateArgs, retrieved: &Retrieved) -> anyhow::Result<GroundTru
             "no positions: give --database-poses and --queries-poses, --ground-truth, or --no-labels"
         );
     };
-    ensure!(
-        queries.zone == references.zone,
-        "queries are in UTM zone {}, references in {}: their coordinates cannot be compared",
-        queries.zone,
-        references.zone
-    );
+    queries.check_comparable(references)?;
     Ok(GroundTruth::within_radius(query_poses, reference_poses, args.positive_dist_threshold)?)
 }

@@ -148,6 +148,7 @@ fn parts(n: usize) -> Parts {
         descriptors: Some(Descriptors::new(descriptors).unwrap()),
         poses: Some(Poses::SixDof((0..n).map(pose).collect())),
         about: About { encoder: Some("HOG".to_owned()), ..About::default() },
+        notes: Vec::new(),
     }
 }
 
