@@ -22,7 +22,7 @@ mod zone;
 
 pub use dataset::Dataset;
 pub use manifest::{DataRoots, DatasetEntry, Layout, Manifest, Tolerance};
-pub use open::{Datasets, Generator};
+pub use open::{AtHand, Datasets, Generator};
 pub use validate::{Problem, Severity, validate};
 pub use zone::ZoneChoice;
 

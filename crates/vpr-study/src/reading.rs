@@ -132,9 +132,9 @@ impl ReadingArgs {
         // What is said of poses is about the other file.
         let reading = Reading { beside: Beside::Ignored, ..Reading::default() };
         let parts = said(exchange::read_with(format, descriptors, &reading)?);
-        self.poses.join(parts, poses).with_context(|| {
-            format!("{} and {}", descriptors.display(), poses.display())
-        })
+        self.poses
+            .join(parts, poses)
+            .with_context(|| format!("{} and {}", descriptors.display(), poses.display()))
     }
 }
 

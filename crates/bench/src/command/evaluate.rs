@@ -194,8 +194,11 @@ fn from_dataset(args: &EvaluateArgs, id: &str, k: usize) -> anyhow::Result<Retri
     let sources = Sources::new([&*args.data.data, Path::new("data")], &args.data.cache, &bar);
     let Some(dataset) = sources.images(id)? else { bail!(sources.why_absent(id, "images")?) };
     let (query_poses, reference_poses) = dataset.poses.clone().unzip();
-    let named = |names: &[PathBuf], poses| {
-        Named { names: names.to_vec(), poses, coordinates: None, place: PathBuf::from(id) }
+    let named = |names: &[PathBuf], poses| Named {
+        names: names.to_vec(),
+        poses,
+        coordinates: None,
+        place: PathBuf::from(id),
     };
     let queries = named(&dataset.queries, query_poses);
     let references = named(&dataset.references, reference_poses);

@@ -87,8 +87,7 @@ impl Named {
 
 /// What images are called within their folder.
 pub(super) fn names_in(folder: &Path, images: &[PathBuf]) -> Names {
-    let name = |path: &PathBuf| path.strip_prefix(folder).unwrap_or(path).to_string_lossy();
-    images.iter().map(|path| name(path).into_owned()).collect()
+    images.iter().map(|path| path.strip_prefix(folder).unwrap_or(path).to_string_lossy()).collect()
 }
 
 pub(super) fn say(notes: &[String]) {

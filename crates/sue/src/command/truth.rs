@@ -7,7 +7,7 @@ use vpr_core::GroundTruth;
 use vpr_data::layout::vpr_bench::GroundTruthFile;
 use vpr_report::cli;
 
-use super::input::{Input, poses_of};
+use super::input::Input;
 
 /// Positions with a radius, or lists.
 #[derive(clap::Args)]
@@ -40,16 +40,7 @@ impl TruthArgs {
             }
             return Ok(truth);
         }
-        let given = self.query_poses.as_ref();
-        let given =
-            given.map(|path| poses_of(path, input.query_names.as_ref(), n_queries)).transpose()?;
-        if let (Some((_, Some(queries))), Some(map)) = (&given, &input.about.coordinates)
-            && queries != map
-        {
-            let (first, second) = (map.to_string(), queries.to_string());
-            return Err(sue::Error::OtherCoordinates { first, second }.into());
-        }
-        let queries = given.map(|it| it.0).or_else(|| input.query_poses.clone());
+        let queries = input.query_poses(self.query_poses.as_deref())?;
         let (Some(queries), Some(references)) = (queries, &input.poses) else {
             bail!("no positions: give --map-poses and --query-poses, or --ground-truth");
         };

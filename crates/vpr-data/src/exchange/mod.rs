@@ -20,6 +20,7 @@ mod lat_lon;
 mod methods_evaluation;
 mod npy;
 mod npz;
+mod page;
 mod parts;
 mod pose_csv;
 mod reading;
@@ -36,6 +37,7 @@ pub use format::{
     Format, Kind, left_out, problems, read, read_pairs, read_with, write, write_pairs,
 };
 pub use join::{Side, comparable};
+pub use page::{Entry, Example, page};
 pub use parts::{PairList, Pairs, Parts};
 pub use reading::{Beside, Reading};
 pub use table::csv_field;

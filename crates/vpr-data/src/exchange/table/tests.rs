@@ -17,8 +17,7 @@ fn parts(text: &str) -> Parts {
 /// Every problem, without the path.
 fn reasons(text: &str) -> Vec<String> {
     let problems = read_with(text, Prefer::Metres, &Reading::default()).unwrap_err();
-    let reason =
-        |err: &vpr_core::Error| err.to_string().split_once("poses.csv: ").unwrap().1.to_owned();
+    let reason = |err: &Error| err.to_string().split_once("poses.csv: ").unwrap().1.to_owned();
     problems.iter().map(reason).collect()
 }
 
