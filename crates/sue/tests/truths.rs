@@ -65,3 +65,45 @@ fn every_form_of_the_truth_gives_the_same_numbers() {
     }
     assert!(n > 50, "{n}");
 }
+
+#[test]
+fn scores_give_the_numbers_of_the_descriptors_they_are_of() {
+    let world = world();
+    let folder = world.path();
+    let read = |name: &str| npy::read_f64(&folder.join(name)).unwrap();
+    let cosines = read("q.npy").dot(&read("db.npy").t());
+    let distances = cosines.mapv(|it| (2.0 - 2.0 * it).max(0.0).sqrt());
+    npy::write_f64(&folder.join("cosines.npy"), cosines.view()).unwrap();
+    npy::write_f64(&folder.join("distances.npy"), distances.view()).unwrap();
+    npy::write_f64(&folder.join("transposed.npy"), distances.t()).unwrap();
+    let poses = ["--map-poses", "db_poses.csv", "-k", "3"];
+    // Names and digits of single distances aside: to three places.
+    let uncertainties = |flags: &[&str]| {
+        let csv = sue(folder, &[&["estimate"], flags, poses.as_slice()].concat());
+        let lines = csv.lines().skip(1).map(|line| {
+            let fields: Vec<&str> = line.split(',').collect();
+            let rounded = |at: usize| format!("{:.3}", fields[at].parse::<f64>().unwrap());
+            (rounded(2), rounded(3))
+        });
+        lines.collect::<Vec<_>>()
+    };
+    let expected = uncertainties(&["--map", "db.npy", "--queries", "q.npy"]);
+    assert_eq!(expected.len(), 3);
+    for flags in [
+        ["--distances", "distances.npy"].as_slice(),
+        &["--similarities", "cosines.npy"],
+        &["--distances", "transposed.npy", "--scores-transposed"],
+    ] {
+        assert_eq!(uncertainties(flags), expected, "{flags:?}");
+    }
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sue"));
+    let large = ["estimate", "--estimator", "l2", "--similarities", "large.txt"];
+    fs::write(folder.join("large.txt"), "0.5 1\n7 0\n").unwrap();
+    let output = command.current_dir(folder).args(large).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("large.txt: row 1: column 0 is 7") && said.contains("--distances"),
+        "{said}"
+    );
+}

@@ -117,6 +117,12 @@ impl Dataset {
             let reason = "positions need a tolerance in metres";
             return Err(Error::Parameter { name: "dataset", value: entry.id.clone(), reason });
         };
+        if let (Some(first), Some(second)) = (queries.zone, references.zone)
+            && first != second
+        {
+            let reason = format!("queries lie in UTM zone {first}, the database in {second}");
+            return Err(Error::format(folder, "file names", reason));
+        }
         let poses = (queries.poses(), references.poses());
         let truth = GroundTruth::within_radius(&poses.0, &poses.1, radius)?;
         let dataset = Self::new(entry, queries.images, references.images, truth);

@@ -8,6 +8,7 @@ use std::{
 
 use crate::{
     layout::{
+        folder::{images_of, is_hidden},
         numbered::images_in_order,
         seven_scenes,
         utm_names::{UtmFolder, parse_name},
@@ -143,6 +144,10 @@ impl Report<'_> {
     fn numbered_images(&mut self, folder: &Path) -> usize {
         let mut numbered: BTreeMap<u64, Vec<PathBuf>> = BTreeMap::new();
         for path in self.entries(folder) {
+            if !is_image(&path) {
+                self.warning(&path, "", "is no .jpg, .jpeg or .png image, and not looked at");
+                continue;
+            }
             match image_number(&path) {
                 Ok(number) => numbered.entry(number).or_default().push(path),
                 Err(reason) => self.error(&path, "", reason),
@@ -173,8 +178,11 @@ impl Report<'_> {
     /// Checks the images of a folder, whatever they are called.
     fn plain_images(&mut self, folder: &Path) {
         // A folder that cannot be listed is the truth's problem.
-        if let Ok(images) = images_in_order(folder) {
-            self.images(folder, &images);
+        if let Ok(listing) = images_in_order(folder) {
+            for note in &listing.notes {
+                self.warning(folder, "", note);
+            }
+            self.images(folder, &listing.images);
         }
     }
 
@@ -190,6 +198,9 @@ impl Report<'_> {
                 if sorted.len() > 1 && sorted[0] == sorted[sorted.len() - 1] {
                     self.warning(folder, "", "all images have the same position");
                 }
+                for note in &opened.notes {
+                    self.warning(folder, "", note);
+                }
                 self.images(folder, &opened.images);
             }
             Err(Error::Format { path, .. }) if is_image(&path) => self.names_below(folder),
@@ -197,16 +208,16 @@ impl Report<'_> {
         }
     }
 
-    /// Names every file whose name has no position.
+    /// Names every image whose name has no position.
     fn names_below(&mut self, folder: &Path) {
-        for path in self.entries(folder) {
-            if path.is_dir() {
-                self.names_below(&path);
-            } else if is_image(&path) {
-                match parse_name(&path) {
-                    Ok(_) => self.images(folder, &[path]),
-                    Err(reason) => self.error(&path, "file name", reason),
-                }
+        let listing = match images_of(folder) {
+            Ok(listing) => listing,
+            Err(err) => return self.failure(folder, err),
+        };
+        for image in listing.images {
+            match parse_name(&image) {
+                Ok(_) => self.images(folder, &[image]),
+                Err(reason) => self.error(&image, "file name", reason),
             }
         }
     }
@@ -222,9 +233,6 @@ impl Report<'_> {
                 self.error(folder, "", cause.to_string());
                 return Vec::new();
             }
-        };
-        let is_hidden = |path: &PathBuf| {
-            path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
         };
         paths.retain(|path| !is_hidden(path));
         paths.sort();

@@ -38,7 +38,7 @@ fn names() -> Names {
 
 fn parts() -> Parts {
     let poses = Some(poses());
-    Parts { names: Some(names()), descriptors: Some(descriptors()), poses, about: About::default() }
+    Parts { names: Some(names()), descriptors: Some(descriptors()), poses, ..Parts::default() }
 }
 
 /// Writes and reads again.
@@ -81,8 +81,8 @@ fn descriptors_pass_every_door_bit_by_bit() {
 
 #[test]
 fn poses_pass_every_door() {
-    use Format::{HlocPoses, Kapture, Kitti, PoseCsv, SevenScenes, Tum};
-    for format in [HlocPoses, Kapture, Kitti, PoseCsv, Tum] {
+    use Format::{Colmap, HlocPoses, Kapture, Kitti, PoseCsv, SevenScenes, Tum};
+    for format in [HlocPoses, Colmap, Kapture, Kitti, PoseCsv, Tum] {
         let read = round_trip(format, &parts());
         assert_close(&read.poses.unwrap(), &poses());
         if !matches!(format, Kitti | Tum) {
@@ -158,7 +158,7 @@ fn a_zone_crossing_is_refused_with_its_lines() {
     let path = folder.path().join("gps.csv");
     std::fs::write(&path, "name,lat,lon\na,52.0,5.9\nb,52.0,6.1\n").unwrap();
     let err = exchange::read(Format::LatLon, &path).unwrap_err().to_string();
-    assert!(err.contains("crosses UTM zones: 31N (line 2), 32N (line 3)"), "{err}");
+    assert!(err.contains("different UTM zones: 31N (1, line 2), 32N (1, line 3)"), "{err}");
 }
 
 #[test]

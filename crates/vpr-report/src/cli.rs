@@ -211,6 +211,36 @@ pub fn print(text: &str) -> anyhow::Result<()> {
     Ok(stdout.flush()?)
 }
 
+/// Refuses, before the work, a file that could not be written after it: something that is no file
+/// is called so, or the folder it should lie in is not there. A file that is there is replaced.
+///
+/// # Errors
+///
+/// Which of these it is, by the path.
+pub fn check_out(path: &Path) -> anyhow::Result<()> {
+    if path.is_dir() {
+        bail!("{}: is a folder, not a file to write", path.display());
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match folder.filter(|folder| !folder.is_dir()) {
+        Some(folder) => bail!("{}: {} is no folder", path.display(), folder.display()),
+        None => Ok(()),
+    }
+}
+
+/// A count that must not be zero, for `value_parser`.
+///
+/// # Errors
+///
+/// Why a text is none.
+pub fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(0) => Err("must be at least 1".to_owned()),
+        Ok(n) => Ok(n),
+        Err(err) => Err(err.to_string()),
+    }
+}
+
 /// Tells a person something, on stderr.
 pub fn note(text: &str) {
     eprintln!("{text}");

@@ -24,6 +24,8 @@ mod hand_crafted;
 mod memo;
 #[cfg(feature = "networks")]
 mod network;
+#[cfg(feature = "cli")]
+pub mod reading;
 mod scored;
 mod sheet;
 mod sources;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::ensure;
 use vpr_core::{GroundTruth, Observer as _, Provenance};
 use vpr_report::cli::{self, Bar, DataArgs, Outcome};
-use vpr_study::{Runner, TruthArgs, technique::hand_crafted};
+use vpr_study::{Runner, TruthArgs, reading::ReadingArgs, technique::hand_crafted};
 
 #[cfg(feature = "networks")]
 use super::{
@@ -33,8 +33,8 @@ pub(crate) struct EvaluateArgs {
         conflicts_with_all = ["database_folder", "database_descriptors", "similarities", "distances"]
     )]
     pub(super) dataset: Option<String>,
-    /// Folder of the reference images, with `@utm_east@utm_north@…` names unless a truth or
-    /// `--no-labels` is given
+    /// Folder of the reference images; their positions are those of --database-poses, or of
+    /// `@utm_east@utm_north@…` names; none are needed with another truth or --no-labels
     #[arg(long, alias = "database_folder", value_name = "DIR", requires = "queries_folder")]
     pub(super) database_folder: Option<PathBuf>,
     /// Folder of the query images
@@ -51,7 +51,7 @@ pub(crate) struct EvaluateArgs {
     /// Leave out images that cannot be decoded, and list them, instead of stopping at the first
     #[arg(long, alias = "skip_bad")]
     skip_bad: bool,
-    /// Descriptors of the references, one row each: any file that `bench map` reads
+    /// Descriptors of the references, one row each: .npy, or any format of docs/formats.md
     #[arg(
         long,
         alias = "database_descriptors",
@@ -78,12 +78,15 @@ pub(crate) struct EvaluateArgs {
     /// The rows of the scores are the references, as VPR_Tutorial has them
     #[arg(long)]
     pub(super) scores_transposed: bool,
-    /// Poses of the references: any file of poses that `bench map` reads
+    /// Poses of the references: a table, or any format of docs/formats.md; by name if both files
+    /// have names, by order otherwise
     #[arg(long, alias = "database_poses", value_name = "FILE", requires = "queries_poses")]
     pub(super) database_poses: Option<PathBuf>,
     /// Poses of the queries
     #[arg(long, alias = "queries_poses", value_name = "FILE", requires = "database_poses")]
     pub(super) queries_poses: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) reading: ReadingArgs,
     #[command(flatten)]
     pub(super) truth: TruthArgs,
     /// Which N of recall@N to print
@@ -183,6 +186,11 @@ fn print(
 }
 
 impl EvaluateArgs {
+    /// Whether what is correct follows from positions.
+    pub(super) fn needs_positions(&self) -> bool {
+        !self.no_labels && self.truth.source().is_none()
+    }
+
     /// What is saved, and where.
     fn saving(&self) -> Saving<'_> {
         Saving {

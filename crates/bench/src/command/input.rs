@@ -1,6 +1,6 @@
 //! What `bench evaluate` compares: images, descriptors, or scores that somebody computed.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use vpr_vision::image;
 
 use super::{
     evaluate::EvaluateArgs,
-    named::Named,
+    named::{Named, say},
     retrieved::{Retrieved, nearest},
 };
 
@@ -43,18 +43,18 @@ impl Input {
         if let Some(id) = &args.dataset {
             return Self::dataset(args, id);
         }
+        let poses = [args.queries_poses.as_deref(), args.database_poses.as_deref()];
+        let (reading, needs) = (args.reading, args.needs_positions());
         if let (Some(queries), Some(references)) = (&args.queries_folder, &args.database_folder) {
-            let needs_positions = !args.no_labels && args.truth.source().is_none();
-            let queries = Named::folder(queries, needs_positions)?;
-            let references = Named::folder(references, needs_positions)?;
+            let queries = Named::folder(queries, poses[0], reading.poses, needs)?;
+            let references = Named::folder(references, poses[1], reading.poses, needs)?;
             return Ok(Self::new(queries, references, Content::Images));
         }
-        let poses = [args.queries_poses.as_deref(), args.database_poses.as_deref()];
         if let (Some(queries), Some(references)) =
             (&args.queries_descriptors, &args.database_descriptors)
         {
-            let (queries, query_rows) = Named::rows(queries, poses[0])?;
-            let (references, reference_rows) = Named::rows(references, poses[1])?;
+            let (queries, query_rows) = Named::rows(queries, poses[0], reading, needs)?;
+            let (references, reference_rows) = Named::rows(references, poses[1], reading, needs)?;
             let content = Content::Rows([query_rows, reference_rows]);
             return Ok(Self::new(queries, references, content));
         }
@@ -68,10 +68,11 @@ impl Input {
         };
         let scores = read_scores(path, scale)?;
         let scores = if args.scores_transposed { scores.swapped() } else { scores };
-        let queries = Named::with_poses(scores.n_queries(), poses[0])
-            .with_context(|| scores_have(path, &scores))?;
-        let references = Named::with_poses(scores.n_references(), poses[1])
-            .with_context(|| scores_have(path, &scores))?;
+        let with = |n: usize, poses: Option<&Path>| {
+            Named::with_poses(n, poses, reading.poses).with_context(|| scores_have(path, &scores))
+        };
+        let queries = with(scores.n_queries(), poses[0])?;
+        let references = with(scores.n_references(), poses[1])?;
         Ok(Self::new(queries, references, Content::Scores(scores)))
     }
 
@@ -87,8 +88,9 @@ impl Input {
         let sources = Sources::new(folders, &cache, &bar);
         let Some(dataset) = sources.images(id)? else { bail!(sources.why_absent(id, "images")?) };
         let (query_poses, reference_poses) = dataset.poses.clone().unzip();
-        let queries = Named::images(dataset.queries.clone(), query_poses);
-        let references = Named::images(dataset.references.clone(), reference_poses);
+        let place = Path::new(id);
+        let queries = Named::images(dataset.queries.clone(), query_poses, place);
+        let references = Named::images(dataset.references.clone(), reference_poses, place);
         let (truth, provenance) = (Some(dataset.truth.clone()), dataset.provenance);
         Ok(Self { truth, provenance, ..Self::new(queries, references, Content::Images) })
     }
@@ -102,9 +104,7 @@ impl Input {
         if let Some(source) = source {
             let sides = Sides { queries: self.queries.side(), references: self.references.side() };
             let found = source.truth(&sides).map_err(|err| self.advised(err))?;
-            for note in &found.notes {
-                cli::note(&format!("note: {note}"));
-            }
+            say(&found.notes);
             return Ok(found.truth);
         }
         if let Some(truth) = &self.truth {
@@ -117,13 +117,7 @@ impl Input {
                  --same-index, or --no-labels"
             );
         };
-        match (&queries.coordinates, &references.coordinates) {
-            (Some(queries), Some(references)) if queries != references => bail!(
-                "queries are in {queries}, references in {references}: their coordinates cannot be \
-                 compared"
-            ),
-            _ => {}
-        }
+        queries.check_comparable(references)?;
         Ok(GroundTruth::within_radius(query_poses, reference_poses, radius)?)
     }
 
@@ -185,7 +179,7 @@ impl Input {
     }
 }
 
-fn scores_have(path: &std::path::Path, scores: &Similarities) -> String {
+fn scores_have(path: &Path, scores: &Similarities) -> String {
     let (n, m) = (scores.n_queries(), scores.n_references());
     let name = path.display();
     format!(

@@ -4,13 +4,15 @@ use std::path::{Path, PathBuf};
 
 use vpr_core::{
     Descriptors, Error, Poses,
-    map::{Coordinates, Names, UtmZone},
+    map::{Coordinates, Names},
 };
 use vpr_data::{
-    exchange::{self, Format, Parts},
-    layout::{numbered::images_in_order, utm_names::UtmFolder},
-    truth::Side,
+    exchange::{self, Beside, Parts, comparable},
+    layout::{folder::Listing, numbered::images_in_order, utm_names::UtmFolder},
+    truth,
 };
+use vpr_report::cli;
+use vpr_study::reading::{PoseArgs, ReadingArgs};
 
 /// Images of one side by name, with their poses if known.
 #[derive(Clone)]
@@ -18,76 +20,109 @@ pub(super) struct Named {
     /// Files of images, names of rows, or their numbers.
     pub(super) names: Vec<PathBuf>,
     pub(super) poses: Option<Poses>,
-    /// What the numbers of the poses mean, if that is known.
-    pub(super) coordinates: Option<Coordinates>,
+    /// What the numbers of the poses mean, if that is said.
+    coordinates: Option<Coordinates>,
+    /// Where the poses are from.
+    place: PathBuf,
     /// Whether the names are more than numbers.
     has_names: bool,
+    /// The folder that images lie in.
     folder: Option<PathBuf>,
 }
 
 impl Named {
-    /// Images of a folder: by their `@` names, or in order of their numbers if positions are not
-    /// asked for.
-    pub(super) fn folder(folder: &Path, needs_positions: bool) -> anyhow::Result<Self> {
-        let folder_of_names = Some(folder.to_owned());
-        if !needs_positions {
-            let names = images_in_order(folder)?;
-            return Ok(Self { folder: folder_of_names, ..Self::images(names, None) });
+    /// Images of a folder: with the poses of a file by their names, with those in their `@` names,
+    /// or in order of their numbers if positions are not asked for.
+    pub(super) fn folder(
+        folder: &Path,
+        poses: Option<&Path>,
+        reading: PoseArgs,
+        needs_positions: bool,
+    ) -> anyhow::Result<Self> {
+        let place = poses.unwrap_or(folder);
+        if needs_positions && poses.is_none() {
+            let opened = UtmFolder::open_in(folder, reading.zone.unwrap_or_default())?;
+            say(&opened.notes);
+            let (poses, coordinates) = (Some(opened.poses()), opened.zone.map(Coordinates::Utm));
+            let named = Self::images(opened.images, poses, place);
+            return Ok(Self { coordinates, folder: Some(folder.to_owned()), ..named });
         }
-        let images = UtmFolder::open(folder)?;
-        let (poses, coordinates) = (Some(images.poses()), zone(&images.zones));
-        let named = Self::images(images.images, poses);
-        Ok(Self { coordinates, folder: folder_of_names, ..named })
+        let Listing { images, notes } = images_in_order(folder)?;
+        say(&notes);
+        let mut parts = Parts::default();
+        if let Some(poses) = poses.filter(|_| needs_positions) {
+            parts.names = Some(names_in(folder, &images));
+            parts = reading.join(parts, poses)?;
+        }
+        let coordinates = parts.about.coordinates;
+        let named = Self::images(images, parts.poses, place);
+        Ok(Self { coordinates, folder: Some(folder.to_owned()), ..named })
     }
 
-    /// Image files.
-    pub(super) fn images(names: Vec<PathBuf>, poses: Option<Poses>) -> Self {
-        Self { names, poses, coordinates: None, has_names: true, folder: None }
+    /// Image files, with poses from a place.
+    pub(super) fn images(names: Vec<PathBuf>, poses: Option<Poses>, place: &Path) -> Self {
+        let place = place.to_owned();
+        Self { names, poses, coordinates: None, place, has_names: true, folder: None }
     }
 
-    /// Rows without names.
-    pub(super) fn numbered(n: usize) -> Self {
-        let names = (0..n).map(|row| PathBuf::from(row.to_string())).collect();
-        Self { has_names: false, ..Self::images(names, None) }
-    }
-
-    /// The rows of a file of descriptors, and what else it and the file of poses know of them.
-    pub(super) fn rows(path: &Path, poses: Option<&Path>) -> anyhow::Result<(Self, Descriptors)> {
-        let mut parts = exchange::read(Format::guess(path)?, path)?;
-        let rows = parts
-            .descriptors
-            .take()
-            .ok_or_else(|| anyhow::Error::from(Error::Empty("descriptors").in_file(path)))?;
-        let named = Self::of_parts(parts, rows.len(), poses)?;
+    /// Rows of a file of descriptors, with poses and names from another file if there is one, and
+    /// else as far as its own says them.
+    pub(super) fn rows(
+        descriptors: &Path,
+        poses: Option<&Path>,
+        reading: ReadingArgs,
+        needs_positions: bool,
+    ) -> anyhow::Result<(Self, Descriptors)> {
+        let beside = if needs_positions { Beside::Used } else { Beside::IfSound };
+        let mut parts = reading.read_both(descriptors, poses, beside)?;
+        let none = || Error::Empty("descriptors").in_file(descriptors);
+        let rows = parts.descriptors.take().ok_or_else(none)?;
+        let named = Self::of_parts(parts, rows.len(), poses.unwrap_or(descriptors));
         Ok((named, rows))
     }
 
-    /// `n` rows that a file of poses may know more of.
-    pub(super) fn with_poses(n: usize, poses: Option<&Path>) -> anyhow::Result<Self> {
-        Self::of_parts(Parts::default(), n, poses)
+    /// `n` rows of which a file of poses may know more.
+    pub(super) fn with_poses(
+        n: usize,
+        poses: Option<&Path>,
+        reading: PoseArgs,
+    ) -> anyhow::Result<Self> {
+        let Some(path) = poses else {
+            return Ok(Self::of_parts(Parts::default(), n, Path::new("")));
+        };
+        let parts = reading.read(path)?;
+        let actual = parts.poses.as_ref().map_or(0, Poses::len);
+        if actual != n {
+            let what = "poses, one per row or column of the scores";
+            return Err(Error::Mismatch { what, expected: n, actual }.in_file(path).into());
+        }
+        Ok(Self::of_parts(parts, n, path))
     }
 
-    fn of_parts(parts: Parts, n: usize, poses: Option<&Path>) -> anyhow::Result<Self> {
-        let mut parts = parts;
-        if let Some(path) = poses {
-            let read = exchange::read(Format::guess(path)?, path)?;
-            parts.poses = None;
-            parts = parts.join(read).map_err(|err| err.in_file(path))?;
-            let actual = parts.poses.as_ref().map_or(0, Poses::len);
-            if actual != n {
-                let what = "poses, one per descriptor";
-                return Err(Error::Mismatch { what, expected: n, actual }.in_file(path).into());
-            }
-        }
+    fn of_parts(parts: Parts, n: usize, place: &Path) -> Self {
         let Parts { names, poses, about, .. } = parts;
-        let names: Option<Vec<PathBuf>> = names
-            .filter(|names| names.len() == n)
-            .map(|names: Names| names.iter().map(PathBuf::from).collect());
         let named = match names {
-            Some(names) => Self::images(names, poses),
-            None => Self { poses, ..Self::numbered(n) },
+            Some(names) => Self::images(names.iter().map(PathBuf::from).collect(), poses, place),
+            None => {
+                let numbers = (0..n).map(|row| PathBuf::from(row.to_string())).collect();
+                Self { has_names: false, ..Self::images(numbers, poses, place) }
+            }
         };
-        Ok(Self { coordinates: about.coordinates, ..named })
+        Self { coordinates: about.coordinates, ..named }
+    }
+
+    /// Checks that distances to the positions of the other side mean something, and says so if only
+    /// one side says where its are.
+    pub(super) fn check_comparable(&self, references: &Self) -> anyhow::Result<()> {
+        if let (Some(queries), Some(references)) = (self.posed(), references.posed()) {
+            say(comparable(queries, references)?.as_slice());
+        }
+        Ok(())
+    }
+
+    fn posed(&self) -> Option<exchange::Side<'_>> {
+        let poses = self.poses.as_ref()?;
+        Some(exchange::Side { place: &self.place, poses, coordinates: self.coordinates })
     }
 
     /// Number of images.
@@ -96,12 +131,12 @@ impl Named {
     }
 
     /// What a truth is told of this side.
-    pub(super) fn side(&self) -> Side {
+    pub(super) fn side(&self) -> truth::Side {
         if !self.has_names {
-            return Side::numbered(self.len());
+            return truth::Side::numbered(self.len());
         }
         let names = self.names.iter().map(|name| name.to_string_lossy().into_owned()).collect();
-        Side { folder: self.folder.clone(), ..Side::named(names) }
+        truth::Side { folder: self.folder.clone(), ..truth::Side::named(names) }
     }
 
     /// Some of the images, in this order.
@@ -112,10 +147,12 @@ impl Named {
     }
 }
 
-/// The zone of names such as `10S`, where the letter is a latitude band: N and above lie north.
-fn zone(zones: &[String]) -> Option<Coordinates> {
-    let zone = zones.iter().find(|zone| !zone.is_empty())?;
-    let letter = zone.chars().last()?;
-    let number = zone.strip_suffix(letter)?.parse().ok()?;
-    Some(Coordinates::Utm(UtmZone { number, south: letter < 'N' }))
+/// What images are called within their folder.
+pub(super) fn names_in(folder: &Path, images: &[PathBuf]) -> Names {
+    images.iter().map(|path| path.strip_prefix(folder).unwrap_or(path).to_string_lossy()).collect()
+}
+
+/// Says what is to be said of what was read.
+pub(super) fn say(notes: &[String]) {
+    notes.iter().for_each(|note| cli::note(&format!("note: {note}")));
 }

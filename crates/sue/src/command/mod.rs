@@ -5,5 +5,6 @@ pub(crate) mod estimate;
 pub(crate) mod evaluate;
 mod input;
 pub(crate) mod run;
+mod scores;
 pub(crate) mod train;
 mod truth;

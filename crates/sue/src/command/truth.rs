@@ -7,7 +7,7 @@ use vpr_core::{GroundTruth, map::Names};
 use vpr_data::truth::{Side, Sides};
 use vpr_report::cli;
 
-use super::input::{Input, poses_of};
+use super::input::Input;
 
 /// Positions with a radius, or any other truth.
 #[derive(clap::Args)]
@@ -23,10 +23,6 @@ pub(crate) struct TruthArgs {
 impl TruthArgs {
     /// The correct references of every query.
     pub(crate) fn truth(&self, input: &Input) -> anyhow::Result<GroundTruth> {
-        let given = self.query_poses.as_ref();
-        let given = given
-            .map(|path| poses_of(path, input.query_names.as_ref(), input.n_queries()))
-            .transpose()?;
         if let Some(source) = self.other.source() {
             let sides = Sides {
                 queries: side(input.n_queries(), input.query_names.as_ref()),
@@ -38,13 +34,7 @@ impl TruthArgs {
             }
             return Ok(found.truth);
         }
-        if let (Some((_, Some(queries))), Some(map)) = (&given, &input.about.coordinates)
-            && queries != map
-        {
-            let (first, second) = (map.to_string(), queries.to_string());
-            return Err(sue::Error::OtherCoordinates { first, second }.into());
-        }
-        let queries = given.map(|it| it.0).or_else(|| input.query_poses.clone());
+        let queries = input.query_poses(self.query_poses.as_deref())?;
         let (Some(queries), Some(references)) = (queries, &input.poses) else {
             bail!(
                 "no positions: give --map-poses and --query-poses, or --ground-truth, --labels or \

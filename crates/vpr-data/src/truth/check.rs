@@ -12,7 +12,7 @@ use crate::{Problem, Severity, layout::numbered::images_in_order};
 
 /// Everything that a reader says of it; the images that are there are told apart from their truth.
 pub(crate) fn problems(source: &Source, queries: &Path, references: &Path) -> Vec<Problem> {
-    let side = |folder: &Path| images_in_order(folder).map(|images| Side::images(folder, &images));
+    let side = |folder: &Path| images_in_order(folder).map(|it| Side::images(folder, &it.images));
     let sides = match (side(queries), side(references)) {
         (Ok(queries), Ok(references)) => Sides { queries, references },
         (queries, references) => {

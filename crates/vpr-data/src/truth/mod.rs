@@ -45,7 +45,7 @@ use resolve::{Task, resolve};
 
 pub(crate) use check::problems;
 pub use file::GroundTruthFile;
-pub use formats::{FORMATS, TruthFormat};
+pub use formats::FORMATS;
 pub use labels::Labels;
 pub use scores::{Scale, read_scores};
 pub use side::{Side, Sides};

@@ -8,8 +8,11 @@ use std::{fs, path::Path, path::PathBuf};
 
 use files::{LISTS, QUERIES, REFERENCES, integers, npy, objects};
 use vpr_core::{GroundTruth, Result};
-use vpr_data::truth::{
-    FORMATS, Form, Found, Labels, Reading, Rows, Scale, Side, Sides, Source, read, read_scores,
+use vpr_data::{
+    exchange::Example,
+    truth::{
+        FORMATS, Form, Found, Labels, Reading, Rows, Scale, Side, Sides, Source, read, read_scores,
+    },
 };
 
 fn expected() -> GroundTruth {
@@ -64,27 +67,34 @@ fn every_form_gives_the_same_lists() {
 }
 
 #[test]
-fn the_examples_of_the_table_of_formats_are_read() {
-    let folder = tempfile::tempdir().unwrap();
+fn the_examples_of_the_page_are_read() {
     let mut n_read = 0;
     for format in FORMATS {
-        let kinds = [".csv", ".txt", ".json"];
-        let Some(kind) =
-            kinds.into_iter().find(|kind| format.given.contains(&format!("FILE{kind}")))
-        else {
-            continue;
+        let Example::Text { path, text } = format.example else { continue };
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join(path);
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(&file, text).unwrap();
+        let labels = |queries, column| Labels::File { path: file.clone(), queries, column };
+        let images = |folder: &str, n: usize| (0..n).map(|i| format!("{folder}/{i}.jpg")).collect();
+        let named = Sides {
+            queries: Side::named(images("queries", 3)),
+            references: Side::named(images("database", 4)),
         };
-        if !format.given.starts_with("--ground-truth") {
-            continue;
-        }
-        let path = folder.path().join(format!("truth{kind}"));
-        fs::write(&path, format.example).unwrap();
-        let found = read(&path, &Reading::default(), &sides()).unwrap();
-        assert_eq!(found.truth, expected(), "{}", format.name);
+        let found = match format.name {
+            "labels" => labels(None, None).truth(&named),
+            "labels in order" => {
+                let queries = folder.path().join("queries.txt");
+                fs::write(&queries, "hall\nstairs\nattic\n").unwrap();
+                labels(Some(queries), None).truth(&numbered(3, 4))
+            }
+            "folders" => Labels::Folders.truth(&sides()),
+            _ => read(&file, &Reading::default(), &numbered(3, 4)),
+        };
+        assert_eq!(found.unwrap().truth, expected(), "{}", format.name);
         n_read += 1;
     }
-    assert_eq!(n_read, 5);
-    assert!(FORMATS.iter().all(|format| format.takers.len() == 4));
+    assert_eq!(n_read, 8);
 }
 
 /// The truth in these bytes, for so many images without names.
