@@ -55,7 +55,7 @@ fn world() -> tempfile::TempDir {
     npy::write_f32(&at("db.npy"), Array2::eye(4).view()).unwrap();
     npy::write_f64(&at("distances.npy"), distances.view()).unwrap();
     npy::write_f64(&at("similarities.npy"), distances.mapv(|it| -it).view()).unwrap();
-    npy::write_f64(&at("transposed.npy"), distances.mapv(|it| -it).t()).unwrap();
+    npy::write_f64(&at("scores_t.npy"), distances.mapv(|it| -it).t()).unwrap();
     let lines = distances.outer_iter().map(|row| {
         let numbers: Vec<String> = row.iter().map(f64::to_string).collect();
         numbers.join(" ") + "\n"
@@ -130,13 +130,13 @@ fn scores_and_descriptors_rank_alike() {
         ["--distances", "distances.npy"].as_slice(),
         &["--distances", "distances.txt"],
         &["--similarities", "similarities.npy"],
-        &["--similarities", "transposed.npy", "--scores-transposed"],
+        &["--similarities", "scores_t.npy", "--scores-transposed"],
         &["--database-descriptors", "db.npy", "--queries-descriptors", "q.npy"],
     ] {
         let line = success(&evaluate(world.path(), flags, &truth));
         assert_eq!(line, LINE, "{flags:?}");
     }
-    let output = evaluate(world.path(), &["--similarities", "transposed.npy"], &truth);
+    let output = evaluate(world.path(), &["--similarities", "scores_t.npy"], &truth);
     assert_refused(&output, &["pairs.csv", "--scores-transposed"]);
 }
 
@@ -174,7 +174,7 @@ fn truths_that_do_not_fit_are_refused_before_the_work() {
     assert!(!folder.join("logs").exists(), "nothing was begun");
     fs::create_dir(folder.join("logs")).unwrap();
     fs::write(folder.join("logs/taken"), "").unwrap();
-    let output = with(&["--ground-truth", "pairs.csv", "--log-dir", "taken"]);
+    let output = with(&["--ground-truth", "padded.npy", "--log-dir", "taken"]);
     assert_refused(&output, &["logs/taken"]);
     assert_eq!(text(&output.stdout), "", "before the work");
 }
@@ -240,4 +240,49 @@ fn images_that_cannot_be_decoded_are_left_out_if_asked() {
     let validated = bench(folder, &["validate", ".", "--labels", "folders"]);
     assert_eq!(validated.status.code(), Some(1));
     assert!(text(&validated.stdout).contains("queries/attic/c.jpg"));
+}
+
+/// The fixture's truth without its last two queries, where a study finds it.
+fn truncated(folder: &Path) {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/fixture");
+    let mut folders = vec![data.clone()];
+    while let Some(from) = folders.pop() {
+        let to = folder.join("fixture").join(from.strip_prefix(&data).unwrap());
+        fs::create_dir_all(&to).unwrap();
+        for entry in fs::read_dir(&from).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                fs::copy(&path, to.join(path.file_name().unwrap())).unwrap();
+            }
+        }
+    }
+    let lists: Vec<Vec<i64>> = (0..10).map(|query| vec![query]).collect();
+    let lists: Vec<&[i64]> = lists.iter().map(Vec::as_slice).collect();
+    let truth = folder.join("fixture/places/ground_truth_new.npy");
+    fs::write(truth, files::vpr_bench(&lists)).unwrap();
+}
+
+#[test]
+fn a_truncated_truth_fails_every_study_that_rests_on_it() {
+    let data = tempfile::tempdir().unwrap();
+    truncated(data.path());
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let flags = ["--data", data.path().to_str().unwrap(), "--check", "docs/results"];
+    for id in ["table-3.2", "table-3.5"] {
+        let text = fs::read_to_string(workspace.join(format!("experiments/{id}.toml"))).unwrap();
+        let lines = text.lines().map(|line| match line.strip_prefix("datasets = ") {
+            Some(_) => "datasets = [\"fixture\"]\n".to_owned(),
+            None => format!("{line}\n"),
+        });
+        let path = data.path().join(format!("{id}.toml"));
+        fs::write(&path, lines.collect::<String>()).unwrap();
+        let output = bench(&workspace, &[&["run", path.to_str().unwrap()], &flags[..]].concat());
+        assert_refused(&output, &["ground_truth_new.npy", "number of rows: 10", "12"]);
+    }
+    let places = data.path().join("fixture/places");
+    let validated = bench(&workspace, &["validate", places.to_str().unwrap()]);
+    assert_eq!(validated.status.code(), Some(1));
+    assert!(text(&validated.stdout).contains("number of rows: 10, but query/ has 12 images"));
 }

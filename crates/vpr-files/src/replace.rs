@@ -49,7 +49,7 @@ impl NewFile {
             .create(true)
             .truncate(true)
             .open(&temporary)
-            .map_err(Error::io(&temporary))?;
+            .map_err(Error::io(target))?;
         // Best effort: the lock only protects from being taken for abandoned.
         let _ = file.try_lock();
         Ok(Self { file, temporary, target: target.to_owned() })

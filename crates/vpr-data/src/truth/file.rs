@@ -74,6 +74,19 @@ impl GroundTruthFile {
         super::read_lists(path, &Reading::default(), &Sides { queries, references })
     }
 
+    /// The same, if it is about so many queries.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] with both numbers.
+    pub fn about(self, n_queries: usize) -> Result<Self> {
+        if self.len() == n_queries {
+            return Ok(self);
+        }
+        let reason = format!("{}, but there are {n_queries} queries", self.len());
+        Err(Error::format(self.path, "number of rows", reason))
+    }
+
     /// Number of queries.
     #[must_use]
     pub fn len(&self) -> usize {

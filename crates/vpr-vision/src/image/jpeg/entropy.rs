@@ -20,6 +20,9 @@ struct Table {
     symbols: Vec<u8>,
 }
 
+/// The blocks that a component has in a unit, and its tables.
+type Part<'a> = (usize, [&'a Table; 2]);
+
 /// How much of the coded data a scan takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Length {
@@ -104,7 +107,7 @@ impl Scan {
         let Some((n_units, parts)) = self.units(header) else { return Length::Unknown };
         let mut bits = Bits { bytes: coded, at: 0, buffer: 0, n: 0 };
         let mut unit = |unit: usize| {
-            if self.restart_interval > 0 && unit > 0 && unit % self.restart_interval == 0 {
+            if self.restart_interval > 0 && unit > 0 && unit.is_multiple_of(self.restart_interval) {
                 bits.restart()?;
             }
             for &(n_blocks, tables) in &parts {
@@ -121,7 +124,7 @@ impl Scan {
     }
 
     /// How many units a scan has, and per component the blocks of a unit and their tables.
-    fn units(&self, header: &[u8]) -> Option<(usize, Vec<(usize, [&Table; 2])>)> {
+    fn units(&self, header: &[u8]) -> Option<(usize, Vec<Part<'_>>)> {
         let max = |axis: usize| self.components.iter().map(|it| it.sampling[axis]).max();
         let (horizontal, vertical) = (max(0)?, max(1)?);
         let [height, width] = self.size;
