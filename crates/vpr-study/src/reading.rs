@@ -83,7 +83,7 @@ impl PoseArgs {
             Some(format) => format,
             None => Format::guess_or(path, "--poses-format", has_poses)?,
         };
-        let parts = said(exchange::read_with(format, path, &self.reading(Beside::Used))?);
+        let parts = said(exchange::read_with(format, path, self.reading(Beside::Used))?);
         if parts.poses.is_none() {
             return Err(Error::Empty("poses").in_file(path).into());
         }
@@ -112,7 +112,7 @@ impl ReadingArgs {
     /// Those of [`FromArgs::format_of`] and of [`exchange::read_with`].
     pub fn read(self, path: &Path, beside: Beside) -> anyhow::Result<Parts> {
         let format = self.from.format_of(path)?;
-        Ok(said(exchange::read_with(format, path, &self.poses.reading(beside))?))
+        Ok(said(exchange::read_with(format, path, self.poses.reading(beside))?))
     }
 
     /// Reads descriptors, and their poses from another file if there is one: that one counts,
@@ -131,7 +131,7 @@ impl ReadingArgs {
         let format = self.from.format_of(descriptors)?;
         // What is said of poses is about the other file.
         let reading = Reading { beside: Beside::Ignored, ..Reading::default() };
-        let parts = said(exchange::read_with(format, descriptors, &reading)?);
+        let parts = said(exchange::read_with(format, descriptors, reading)?);
         self.poses
             .join(parts, poses)
             .with_context(|| format!("{} and {}", descriptors.display(), poses.display()))
@@ -140,6 +140,8 @@ impl ReadingArgs {
 
 /// Says what is to be said of a reading, once.
 fn said(mut parts: Parts) -> Parts {
-    parts.notes.drain(..).for_each(|note| cli::note(&format!("note: {note}")));
+    for note in parts.notes.drain(..) {
+        cli::note(&format!("note: {note}"));
+    }
     parts
 }

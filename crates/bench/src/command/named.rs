@@ -152,7 +152,9 @@ pub(super) fn names_in(folder: &Path, images: &[PathBuf]) -> Names {
     images.iter().map(|path| path.strip_prefix(folder).unwrap_or(path).to_string_lossy()).collect()
 }
 
-/// Says what is to be said of what was read.
+/// Says what is to be said of files, on stderr.
 pub(super) fn say(notes: &[String]) {
-    notes.iter().for_each(|note| cli::note(&format!("note: {note}")));
+    for note in notes {
+        cli::note(&format!("note: {note}"));
+    }
 }

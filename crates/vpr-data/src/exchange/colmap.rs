@@ -39,8 +39,8 @@ fn file_in(folder: &Path) -> Result<PathBuf> {
 }
 
 fn pose(numbers: [f64; 7]) -> Result<Pose, String> {
-    let [w, i, j, k, x, y, z] = numbers;
-    PoseConvention::HLOC.pose([x, y, z], [w, i, j, k])
+    let [wxyz @ .., x, y, z] = numbers;
+    PoseConvention::HLOC.pose([x, y, z], wxyz)
 }
 
 /// `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, and below each a line of points, perhaps empty.

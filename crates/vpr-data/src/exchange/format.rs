@@ -165,7 +165,7 @@ impl FromStr for Format {
     }
 }
 
-fn read_all(format: Format, path: &Path, reading: &Reading) -> report::Read<Parts> {
+fn read_all(format: Format, path: &Path, reading: Reading) -> report::Read<Parts> {
     if let Some(direction) = reading.direction.filter(|_| !format.leaves_direction_open()) {
         let reason = "this format says itself which way its poses go";
         let (name, value) = ("pose-direction", format!("{direction}, of {format}"));
@@ -210,7 +210,7 @@ fn read_all_pairs(format: Format, path: &Path) -> report::Read<Pairs> {
 /// [`Error::Io`], or the first problem of the file and how many more there are; [`problems`] lists
 /// them. [`Error::Parameter`] if the format holds pairs.
 pub fn read(format: Format, path: &Path) -> Result<Parts> {
-    read_with(format, path, &Reading::default())
+    read_with(format, path, Reading::default())
 }
 
 /// Reads what a file knows of images, told what it does not say itself.
@@ -218,7 +218,7 @@ pub fn read(format: Format, path: &Path) -> Result<Parts> {
 /// # Errors
 ///
 /// Those of [`read`]; [`Error::Parameter`] if a direction is named for a format that has its own.
-pub fn read_with(format: Format, path: &Path, reading: &Reading) -> Result<Parts> {
+pub fn read_with(format: Format, path: &Path, reading: Reading) -> Result<Parts> {
     read_all(format, path, reading).map_err(report::first)
 }
 
@@ -235,7 +235,7 @@ pub fn read_pairs(format: Format, path: &Path) -> Result<Pairs> {
 #[must_use]
 pub fn problems(format: Format, path: &Path) -> Vec<Error> {
     let pairs = || read_all_pairs(format, path).err().unwrap_or_default();
-    let images = || read_all(format, path, &Reading::default()).err().unwrap_or_default();
+    let images = || read_all(format, path, Reading::default()).err().unwrap_or_default();
     match format {
         Format::Map => verify(path),
         Format::HlocPairs => pairs(),

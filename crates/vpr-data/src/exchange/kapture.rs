@@ -45,20 +45,17 @@ pub(super) fn read(folder: &Path) -> Read<Parts> {
     let mut report = Report::new(&trajectories);
     let moments = read_moments(&text, &mut report);
     let mut found = Found::new(folder);
-    match &records {
-        Some(records) => {
-            for (key, image) in records {
-                found.add(image, key, &moments, &rigs, &mut report);
-            }
-            found.say_rest(&moments, &rigs);
+    if let Some(records) = &records {
+        for (key, image) in records {
+            found.add(image, key, &moments, &rigs, &mut report);
         }
-        None => {
-            let note = format!("{}: no {RECORDS}: images are called time/device", folder.display());
-            found.notes.push(note);
-            for (time, device) in moments.devices(&rigs) {
-                let image = format!("{time}/{device}");
-                found.add(&image, &(time, device), &moments, &rigs, &mut report);
-            }
+        found.say_rest(&moments, &rigs);
+    } else {
+        let note = format!("{}: no {RECORDS}: images are called time/device", folder.display());
+        found.notes.push(note);
+        for (time, device) in moments.devices(&rigs) {
+            let image = format!("{time}/{device}");
+            found.add(&image, &(time, device), &moments, &rigs, &mut report);
         }
     }
     let Found { names, poses, notes, .. } = found.finished();
@@ -119,8 +116,8 @@ fn transform_of(fields: &[&str]) -> Result<Option<Pose>, String> {
     {
         return Ok(None);
     }
-    let [w, i, j, k, x, y, z] = numbers::<7>(fields.iter().copied())?;
-    PoseConvention::KAPTURE.pose([x, y, z], [w, i, j, k]).map(Some)
+    let [wxyz @ .., x, y, z] = numbers::<7>(fields.iter().copied())?;
+    PoseConvention::KAPTURE.pose([x, y, z], wxyz).map(Some)
 }
 
 /// Images in the order of the file, with time and device.

@@ -10,7 +10,7 @@ use vpr_core::{
 use vpr_files::replace;
 
 /// Columns are found by their titles, see [`table`].
-pub(super) fn read(path: &Path, reading: &Reading) -> Read<Parts> {
+pub(super) fn read(path: &Path, reading: Reading) -> Read<Parts> {
     table::read(path, table::Prefer::Degrees, reading)
 }
 

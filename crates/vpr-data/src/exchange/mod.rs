@@ -37,7 +37,7 @@ pub use format::{
     Format, Kind, left_out, problems, read, read_pairs, read_with, write, write_pairs,
 };
 pub use join::{Side, comparable};
-pub use page::{Entry, Example, page};
+pub use page::{Entry, Example, entries, page};
 pub use parts::{PairList, Pairs, Parts};
 pub use reading::{Beside, Reading};
 pub use table::csv_field;

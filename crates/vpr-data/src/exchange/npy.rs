@@ -17,7 +17,7 @@ fn csv_of(path: &Path) -> PathBuf {
     path.with_extension("csv")
 }
 
-pub(super) fn read(path: &Path, reading: &Reading) -> Read<Parts> {
+pub(super) fn read(path: &Path, reading: Reading) -> Read<Parts> {
     let parts = read_descriptors(path).map_err(|err| vec![err])?;
     let csv = csv_of(path);
     match beside(&csv, &parts, reading) {
@@ -36,7 +36,7 @@ pub(super) fn read(path: &Path, reading: &Reading) -> Read<Parts> {
 }
 
 /// What a table beside descriptors says of them, if there is one that is asked for.
-fn beside(csv: &Path, parts: &Parts, reading: &Reading) -> Read<Option<Parts>> {
+fn beside(csv: &Path, parts: &Parts, reading: Reading) -> Read<Option<Parts>> {
     if reading.beside == Beside::Ignored || !csv.is_file() {
         return Ok(None);
     }

@@ -22,8 +22,8 @@ const NAMES: [&str; 8] =
 /// `NumPy`'s names of the types that may be texts.
 const TEXTS: [&str; 3] = ["str", "bytes", "object"];
 
-/// Descriptors are the array `descriptors`, or the only matrix of numbers; `positions`,
-/// `orientations` and names (texts, objects, or bytes with `name_offsets`) may be there.
+/// Descriptors are the array `descriptors`, or the only matrix of numbers, if there are any;
+/// `positions`, `orientations` and names (texts, objects, or bytes with `name_offsets`) may be there.
 pub(super) fn read(path: &Path) -> Read<Parts> {
     read_parts(path).map_err(|err| vec![err])
 }
@@ -32,11 +32,13 @@ fn read_parts(path: &Path) -> Result<Parts> {
     let arrays = npz::names(path)?;
     let has = |name: &str| arrays.iter().any(|array| array == name);
     let wrong = |name: &str, reason: String| Error::format(path, format!("array `{name}`"), reason);
-    let rows = descriptors_in(path, &arrays)?;
-    let (descriptors, stored) = npz::read_f32_rounded(path, &rows)?;
-    let mut parts = Parts { descriptors: Some(Descriptors::new(descriptors)?), ..Parts::default() };
-    parts.notes.extend(rounded::note(path, Some(&rows), stored));
-    let mut used = vec![rows];
+    let (mut parts, mut used) = (Parts::default(), Vec::new());
+    if let Some(rows) = descriptors_in(path, &arrays)? {
+        let (descriptors, stored) = npz::read_f32_rounded(path, &rows)?;
+        parts.descriptors = Some(Descriptors::new(descriptors)?);
+        parts.notes.extend(rounded::note(path, Some(&rows), stored));
+        used.push(rows);
+    }
     if has(POSITIONS) {
         let positions: Array2<f64> = npz::read(path, POSITIONS)?;
         let orientations: Option<Array2<f64>> =
@@ -66,10 +68,11 @@ fn read_parts(path: &Path) -> Result<Parts> {
     Ok(parts)
 }
 
-/// The array of descriptors.
-fn descriptors_in(path: &Path, arrays: &[String]) -> Result<String> {
-    if arrays.iter().any(|array| array == DESCRIPTORS) {
-        return Ok(DESCRIPTORS.to_owned());
+/// The array of descriptors; `None` if there are only positions.
+fn descriptors_in(path: &Path, arrays: &[String]) -> Result<Option<String>> {
+    let has = |name: &str| arrays.iter().any(|array| array == name);
+    if has(DESCRIPTORS) {
+        return Ok(Some(DESCRIPTORS.to_owned()));
     }
     let mut matrices = Vec::new();
     for array in arrays.iter().filter(|it| ![POSITIONS, ORIENTATIONS].contains(&it.as_str())) {
@@ -80,7 +83,8 @@ fn descriptors_in(path: &Path, arrays: &[String]) -> Result<String> {
     }
     let known = || shorten(&arrays.join(", "));
     let reason = match matrices.as_slice() {
-        [one] => return Ok(one.clone()),
+        [one] => return Ok(Some(one.clone())),
+        [] if has(POSITIONS) => return Ok(None),
         [] => format!("is not there, nor any matrix of numbers; known: {}", known()),
         _ => format!("is not there, but several matrices are: {}", shorten(&matrices.join(", "))),
     };

@@ -66,7 +66,7 @@ pub(super) fn read_text(path: &Path) -> Read<String> {
     }
     let mut text = String::from_utf8(bytes).map_err(|err| {
         let valid = err.utf8_error().valid_up_to();
-        let line = 1 + err.as_bytes()[..valid].iter().filter(|&&byte| byte == b'\n').count();
+        let line = err.as_bytes()[..valid].split(|&byte| byte == b'\n').count();
         vec![Error::format(path, format!("line {line}"), "is not UTF-8 text")]
     })?;
     if text.starts_with(BYTE_ORDER_MARK) {

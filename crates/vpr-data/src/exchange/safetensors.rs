@@ -18,7 +18,7 @@ use vpr_files::{access, replace, shorten};
 
 const ALIGNMENT: usize = 64;
 
-/// Descriptors are the tensor `descriptors`, or the only matrix of numbers; `scales`, `positions`,
+/// Descriptors are the tensor `descriptors`, or the only matrix of numbers, if there are any; `scales`, `positions`,
 /// `orientations`, `names` and `name_offsets` are used if they are there.
 pub(super) fn read(path: &Path) -> Read<Parts> {
     read_parts(path).map_err(|err| vec![err])
@@ -30,10 +30,12 @@ fn read_parts(path: &Path) -> Result<Parts> {
     let tensors = Tensors { path, file: &file, header: &header };
     let wrong =
         |name: &str, reason: String| Error::format(path, format!("tensor `{name}`"), reason);
-    let (rows, entry) = tensors.matrix()?;
-    let descriptors = Some(tensors.descriptors(rows, entry)?);
-    let mut parts = Parts { descriptors, ..Parts::default() };
-    parts.notes.extend(rounded::note(path, Some(rows), element_name(entry.dtype)));
+    let matrix = tensors.matrix()?;
+    let mut parts = Parts::default();
+    if let Some((rows, entry)) = matrix {
+        parts.descriptors = Some(tensors.descriptors(rows, entry)?);
+        parts.notes.extend(rounded::note(path, Some(rows), element_name(entry.dtype)));
+    }
     parts.about = About::read_from(&header.metadata)
         .map_err(|(place, reason)| Error::format(path, place, reason))?;
     if let Some(positions) = tensors.doubles("positions")? {
@@ -61,7 +63,8 @@ fn read_parts(path: &Path) -> Result<Parts> {
         (None, Some(_)) => return lone("name_offsets", "names"),
         (None, None) => {}
     }
-    let is_used = |name: &&String| *name == rows || KNOWN.contains(&name.as_str());
+    let rows = matrix.map(|(name, _)| name);
+    let is_used = |name: &&String| Some(*name) == rows || KNOWN.contains(&name.as_str());
     let unused: Vec<&str> =
         header.tensors.keys().filter(|name| !is_used(name)).map(String::as_str).collect();
     if !unused.is_empty() {
@@ -165,8 +168,8 @@ impl Tensors<'_> {
         array.map(Some).ok_or_else(|| self.wrong(name, "is no matrix"))
     }
 
-    /// The matrix that descriptors are in.
-    fn matrix(&self) -> Result<(&String, &TensorEntry)> {
+    /// The matrix that descriptors are in; `None` if there are only positions.
+    fn matrix(&self) -> Result<Option<(&String, &TensorEntry)>> {
         let is_other = |name: &str| KNOWN[1..].contains(&name);
         let is_matrix = |(name, entry): &(&String, &TensorEntry)| {
             entry.shape.len() == 2 && entry.dtype != ElementType::Other && !is_other(name)
@@ -174,7 +177,8 @@ impl Tensors<'_> {
         let mut matrices = self.header.tensors.iter().filter(is_matrix);
         let named = self.header.tensors.get_key_value("descriptors");
         match (named, matrices.next(), matrices.next()) {
-            (Some(named), ..) | (None, Some(named), None) => Ok(named),
+            (Some(named), ..) | (None, Some(named), None) => Ok(Some(named)),
+            (None, None, _) if self.header.tensors.contains_key("positions") => Ok(None),
             (None, None, _) => Err(self.wrong("descriptors", "is not there, nor any matrix")),
             _ => Err(self.wrong("descriptors", "is not there, but several matrices are")),
         }
@@ -186,8 +190,10 @@ impl Tensors<'_> {
             return Err(self.wrong(name, "has rows of length zero"));
         }
         // Bytes with a factor per row, as our maps have them; without factors they are numbers.
-        let scaled = entry.dtype == ElementType::I8 && self.header.tensors.contains_key("scales");
-        let row_type = RowType::of_element(entry.dtype).filter(|it| *it != RowType::I8 || scaled);
+        let has_scales =
+            entry.dtype == ElementType::I8 && self.header.tensors.contains_key("scales");
+        let row_type =
+            RowType::of_element(entry.dtype).filter(|it| *it != RowType::I8 || has_scales);
         let Some(row_type) = row_type else {
             let Some(values) = numbers(entry.dtype, &self.read(entry)?) else {
                 return Err(self.wrong(
@@ -204,14 +210,14 @@ impl Tensors<'_> {
         let scales = self.bytes("scales", ElementType::F32)?.unwrap_or_default();
         let scales: Vec<f32> =
             scales.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
-        if scaled && scales.len() != n {
+        if has_scales && scales.len() != n {
             return Err(self.wrong("scales", format!("has {} scales for {n} rows", scales.len())));
         }
         let bytes = self.read(entry)?;
         let mut values = Array2::zeros((n, dim));
         let stored = bytes.chunks_exact(dim * row_type.size());
         for (row, (bytes, mut values)) in stored.zip(values.rows_mut()).enumerate() {
-            let scale = if scaled { scales.get(row).copied().unwrap_or(1.0) } else { 1.0 };
+            let scale = if has_scales { scales.get(row).copied().unwrap_or(1.0) } else { 1.0 };
             row_type.decode(bytes, scale, values.as_slice_mut().unwrap_or_default());
         }
         Descriptors::new(values)

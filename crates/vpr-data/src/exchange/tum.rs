@@ -12,7 +12,7 @@ use vpr_core::{Poses, Result, map::Names};
 use vpr_files::replace;
 
 /// Names are the timestamps as they are written.
-pub(super) fn read(path: &Path, reading: &Reading) -> Read<Parts> {
+pub(super) fn read(path: &Path, reading: Reading) -> Read<Parts> {
     let convention = PoseConvention::TUM.directed(reading.direction);
     let text = read_text(path)?;
     let mut report = Report::new(path);

@@ -21,7 +21,7 @@ use vpr_files::replace;
 const ROUNDING_M: f64 = 0.02;
 
 /// Reads a folder of images, or a text file with one such name per line.
-pub(super) fn read(path: &Path, reading: &Reading) -> Read<Parts> {
+pub(super) fn read(path: &Path, reading: Reading) -> Read<Parts> {
     if path.is_dir() {
         let folder = UtmFolder::open_in(path, reading.zone).map_err(|err| vec![err])?;
         let names = folder.images.iter();
@@ -32,16 +32,16 @@ pub(super) fn read(path: &Path, reading: &Reading) -> Read<Parts> {
     }
     let text = read_text(path)?;
     let mut report = Report::new(path);
-    let (mut names, mut lines, mut named) = (Names::default(), Vec::new(), Vec::new());
+    let (mut names, mut lines, mut said) = (Names::default(), Vec::new(), Vec::new());
     for (line, name) in content_lines(&text) {
         if let Some(position) = report.keep(line, parse_name(Path::new(name))) {
             names.push(name);
             lines.push(line);
-            named.push(position);
+            said.push(position);
         }
     }
     let place = |row: usize| format!("line {}", lines[row]);
-    match in_one_zone(&named, reading.zone, path, place).map_err(advised) {
+    match in_one_zone(&said, reading.zone, path, place).map_err(advised) {
         Ok(InNames { positions, zone, notes }) => {
             let (names, poses) = (Some(names), Some(Poses::Planar(positions)));
             report.finish(Parts { names, poses, about: about(zone), notes, ..Parts::default() })
@@ -73,8 +73,8 @@ pub(super) fn write(path: &Path, parts: &Parts) -> Result<()> {
         let name = parts.name(row);
         let (x, y) = (position.x, position.y);
         held::Names::Line.check(path, &name)?;
-        let said = parse_name(Path::new(&name)).ok();
-        if said.is_some_and(|said| (said.position - position).norm() < ROUNDING_M) {
+        let own = parse_name(Path::new(&name)).ok();
+        if own.is_some_and(|own| (own.position - position).norm() < ROUNDING_M) {
             let _ = writeln!(text, "{name}");
         } else if name.contains('@') {
             let place = format!("name `{}`", vpr_files::shorten(&name));

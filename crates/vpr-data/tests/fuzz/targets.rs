@@ -225,8 +225,11 @@ fn array(descr: &str, shape: &str, body: &[u8]) -> Vec<u8> {
     [b"\x93NUMPY\x01\x00", length.as_slice(), header.as_bytes(), body].concat()
 }
 
-/// Numbers of other types, and names as texts.
-fn write_number_seeds(seed: &dyn Fn(&str, &str, &[u8])) {
+/// What other programs write: texts, numbers of other types, and names as texts.
+fn write_foreign_seeds(seed: &dyn Fn(&str, &str, &[u8])) {
+    for (target, name, text) in TEXTS {
+        seed(target, name, text.as_bytes());
+    }
     let doubles: Vec<u8> = (0..6).flat_map(|it| (f64::from(it) * 0.1).to_le_bytes()).collect();
     seed("npy", "sound-f64", &array("<f8", "(3, 2)", &doubles));
     let halves: Vec<u8> = (0..6_u16).flat_map(|it| (0x3c00 + it).to_le_bytes()).collect();
@@ -268,6 +271,19 @@ fn pca(folder: &Path) -> PathBuf {
     path
 }
 
+/// Writes what holds references per query.
+fn write_pair_seeds(folder: &Path, seed: &dyn Fn(&str, &str, &Path)) {
+    let list = |query: &str| PairList {
+        query: query.to_owned(),
+        references: vec!["db/1.jpg".to_owned(), "db/2.jpg".to_owned()],
+    };
+    let pairs = Pairs { lists: vec![list("q/1.jpg"), list("q/2.jpg")] };
+    exchange::write_pairs(Format::VprEval, &folder.join("eval"), &pairs).unwrap();
+    seed("vpr-eval-preds", "sound", &folder.join("eval/preds/000.txt"));
+    exchange::write_pairs(Format::HlocPairs, &folder.join("pairs"), &pairs).unwrap();
+    seed("hloc-pairs", "sound", &folder.join("pairs"));
+}
+
 /// Writes one sound file of every format, and keeps what is there already.
 pub(crate) fn write_seeds(corpus: &Path) {
     let folder = tempfile::tempdir().unwrap();
@@ -276,12 +292,7 @@ pub(crate) fn write_seeds(corpus: &Path) {
         fs::create_dir_all(&place).unwrap();
         fs::copy(file, place.join(name)).unwrap();
     };
-    for (target, name, text) in TEXTS {
-        let path = folder.path().join("text");
-        fs::write(&path, text).unwrap();
-        seed(target, name, &path);
-    }
-    write_number_seeds(&|target, name, bytes| {
+    write_foreign_seeds(&|target, name, bytes| {
         let path = folder.path().join("bytes");
         fs::write(&path, bytes).unwrap();
         seed(target, name, &path);
@@ -320,15 +331,7 @@ pub(crate) fn write_seeds(corpus: &Path) {
     seed("kapture-trajectories", "sound", &place("kapture/sensors/trajectories.txt"));
     exchange::write(Format::VprEval, &place("eval"), &six_dof).unwrap();
     seed("vpr-eval", "sound", &place("eval/database_descriptors.npy"));
-    let list = |query: &str| PairList {
-        query: query.to_owned(),
-        references: vec!["db/1.jpg".to_owned(), "db/2.jpg".to_owned()],
-    };
-    let pairs = Pairs { lists: vec![list("q/1.jpg"), list("q/2.jpg")] };
-    exchange::write_pairs(Format::VprEval, &place("eval"), &pairs).unwrap();
-    seed("vpr-eval-preds", "sound", &place("eval/preds/000.txt"));
-    exchange::write_pairs(Format::HlocPairs, &place("pairs"), &pairs).unwrap();
-    seed("hloc-pairs", "sound", &place("pairs"));
+    write_pair_seeds(folder.path(), &seed);
     let zone = UtmZone { number: 32, south: false };
     let planar = vec![PlanarPosition::new(593_139.5, 5_763_197.8); 3];
     let about = About { coordinates: Some(Coordinates::Utm(zone)), ..About::default() };

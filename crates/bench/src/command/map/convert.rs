@@ -43,8 +43,10 @@ pub(super) fn run(args: &ConvertArgs) -> anyhow::Result<Outcome> {
         cli::note(&format!("wrote the references of {} queries", pairs.lists.len()));
         return Ok(Outcome::Success);
     }
-    let parts = exchange::read_with(from, &args.input, &args.reading.poses.reading(Beside::Used))?;
-    parts.notes.iter().for_each(|note| cli::note(&format!("note: {note}")));
+    let parts = exchange::read_with(from, &args.input, args.reading.poses.reading(Beside::Used))?;
+    for note in &parts.notes {
+        cli::note(&format!("note: {note}"));
+    }
     for what in exchange::left_out(to, &parts) {
         cli::note(&format!("note: {to} has no place for the {what}: they are left out"));
     }

@@ -6,7 +6,7 @@
 mod columns;
 mod text;
 
-use std::path::Path;
+use std::{fs::File, io::Read as _, path::Path};
 
 use vpr_core::{
     Error, PlanarPosition, Pose, Poses, Position, Result,
@@ -25,8 +25,11 @@ use columns::{Columns, Kind};
 pub use text::csv_field;
 use text::{Header, NoHeader, Row};
 
+/// Titles stand in the first so many bytes.
+const LONGEST_START: u64 = 1 << 16;
+
 /// Reads a table; of metres and degrees, if it has both, those that are preferred.
-pub(super) fn read(path: &Path, prefer: Prefer, reading: &Reading) -> Read<Parts> {
+pub(super) fn read(path: &Path, prefer: Prefer, reading: Reading) -> Read<Parts> {
     let text = read_text(path)?;
     let mut report = Report::new(path);
     let header = match text::header(&text, prefer) {
@@ -62,7 +65,9 @@ pub(super) fn is_in_degrees(path: &Path) -> Result<bool> {
 }
 
 fn header_of(path: &Path) -> Result<Result<Header, NoHeader>> {
-    let bytes = std::fs::read(path).map_err(Error::io(path))?;
+    let file = File::open(path).map_err(Error::io(path))?;
+    let mut bytes = Vec::new();
+    file.take(LONGEST_START).read_to_end(&mut bytes).map_err(Error::io(path))?;
     // A table whose names are not UTF-8 is one too: reading it says what is wrong.
     let text = String::from_utf8_lossy(&bytes);
     Ok(text::header(text.trim_start_matches(BYTE_ORDER_MARK), Prefer::Metres))
@@ -168,7 +173,7 @@ impl<'a> Table<'a> {
         self,
         path: &Path,
         header: &Header,
-        reading: &Reading,
+        reading: Reading,
         mut report: Report<'_>,
     ) -> Read<Parts> {
         let column = |title: Option<usize>| {
@@ -225,7 +230,7 @@ impl<'a> Table<'a> {
 }
 
 /// What a person should know of a table that was read.
-fn notes(path: &Path, header: &Header, reading: &Reading) -> Vec<String> {
+fn notes(path: &Path, header: &Header, reading: Reading) -> Vec<String> {
     let path = path.display();
     let mut notes = Vec::new();
     if !header.columns.unused.is_empty() {

@@ -3,7 +3,7 @@
 use super::*;
 use crate::ZoneChoice;
 
-fn read_with(text: &str, prefer: Prefer, reading: &Reading) -> Read<Parts> {
+fn read_with(text: &str, prefer: Prefer, reading: Reading) -> Read<Parts> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("poses.csv");
     std::fs::write(&path, text).unwrap();
@@ -11,12 +11,12 @@ fn read_with(text: &str, prefer: Prefer, reading: &Reading) -> Read<Parts> {
 }
 
 fn parts(text: &str) -> Parts {
-    read_with(text, Prefer::Metres, &Reading::default()).unwrap()
+    read_with(text, Prefer::Metres, Reading::default()).unwrap()
 }
 
 /// Every problem, without the path.
 fn reasons(text: &str) -> Vec<String> {
-    let problems = read_with(text, Prefer::Metres, &Reading::default()).unwrap_err();
+    let problems = read_with(text, Prefer::Metres, Reading::default()).unwrap_err();
     let reason = |err: &Error| err.to_string().split_once("poses.csv: ").unwrap().1.to_owned();
     problems.iter().map(reason).collect()
 }
@@ -86,7 +86,7 @@ const EUROC: &str = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_
 fn eurocs_header_and_the_named_directions() {
     let read = |direction| {
         let reading = Reading { direction, ..Reading::default() };
-        read_with(EUROC, Prefer::Metres, &reading).unwrap()
+        read_with(EUROC, Prefer::Metres, reading).unwrap()
     };
     let plain = read(None);
     assert_eq!(names(&plain), ["1403636580838555648"]);
@@ -192,10 +192,10 @@ fn metres_come_before_degrees_unless_these_are_asked_for() {
     let metres = parts(text);
     assert_eq!(metres.poses.unwrap().position(0).x, 593_139.5);
     assert_eq!(metres.about.coordinates, None);
-    let degrees = read_with(text, Prefer::Degrees, &Reading::default()).unwrap();
+    let degrees = read_with(text, Prefer::Degrees, Reading::default()).unwrap();
     assert!((degrees.poses.unwrap().position(0).x - 593_139.469).abs() < 1e-3);
     assert_eq!(degrees.about.coordinates, Some(Coordinates::Utm("31N".parse().unwrap())));
-    let err = read_with("name,x,y\na,1,2\n", Prefer::Degrees, &Reading::default()).unwrap_err();
+    let err = read_with("name,x,y\na,1,2\n", Prefer::Degrees, Reading::default()).unwrap_err();
     assert!(err[0].to_string().contains("expected titles such as `name,lat,lon`"), "{}", err[0]);
 }
 
@@ -204,7 +204,7 @@ fn a_column_of_zones_must_say_one() {
     let zone = |values: &str| {
         let (first, second) = values.split_once(' ').unwrap();
         let text = format!("name,x,y,zone\na,1,2,{first}\nb,1,3,{second}\n");
-        let read = read_with(&text, Prefer::Metres, &Reading::default());
+        let read = read_with(&text, Prefer::Metres, Reading::default());
         read.map(|parts| parts.about.coordinates.map(|it| it.to_string()))
     };
     assert_eq!(zone("18T 18T").unwrap(), Some("utm 18N".to_owned()));
@@ -222,7 +222,7 @@ fn degrees_in_two_zones_need_a_choice() {
     let err = reason(text);
     assert!(err.contains("30N (1, line 2), 31N (1, line 3)") && err.contains("--zone"), "{err}");
     let zone = ZoneChoice::Given("30N".parse().unwrap());
-    let read = read_with(text, Prefer::Metres, &Reading { zone, ..Reading::default() }).unwrap();
+    let read = read_with(text, Prefer::Metres, Reading { zone, ..Reading::default() }).unwrap();
     assert_eq!(read.about.coordinates, Some(Coordinates::Utm("30N".parse().unwrap())));
     let poses = read.poses.unwrap();
     let apart = (poses.position(0) - poses.position(1)).norm();
@@ -238,7 +238,7 @@ fn degrees_in_two_zones_need_a_choice() {
 #[test]
 fn positions_alone_have_no_direction() {
     let reading = Reading { direction: Some(Direction::CameraFromWorld), ..Reading::default() };
-    let err = read_with("name,x,y,z\na,1,2,3\n", Prefer::Metres, &reading).unwrap_err();
+    let err = read_with("name,x,y,z\na,1,2,3\n", Prefer::Metres, reading).unwrap_err();
     assert!(err[0].to_string().contains("needs orientations"), "{}", err[0]);
 }
 

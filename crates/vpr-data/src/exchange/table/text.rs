@@ -199,32 +199,27 @@ impl Records<'_> {
         loop {
             let blanks = |char: char| char.is_whitespace() && char != '\n' && char != separator;
             self.text = self.text.trim_start_matches(blanks);
-            let field = match self.text.strip_prefix('"') {
-                Some(rest) => {
-                    self.text = rest;
-                    let field = self.quoted()?;
-                    self.text = self.text.trim_start_matches(blanks);
-                    if !self.text.is_empty() && !self.text.starts_with([separator, '\n']) {
-                        self.skip_line();
-                        return Err("something follows a closing quote".to_owned());
-                    }
-                    field
+            let field = if let Some(rest) = self.text.strip_prefix('"') {
+                self.text = rest;
+                let field = self.quoted()?;
+                self.text = self.text.trim_start_matches(blanks);
+                if !self.text.is_empty() && !self.text.starts_with([separator, '\n']) {
+                    self.skip_line();
+                    return Err("something follows a closing quote".to_owned());
                 }
-                None => {
-                    let end = self.text.find([separator, '\n']).unwrap_or(self.text.len());
-                    let field = self.text[..end].trim_end().to_owned();
-                    self.text = &self.text[end..];
-                    field
-                }
+                field
+            } else {
+                let end = self.text.find([separator, '\n']).unwrap_or(self.text.len());
+                let field = self.text[..end].trim_end().to_owned();
+                self.text = &self.text[end..];
+                field
             };
             fields.push(field);
-            match self.text.strip_prefix(separator) {
-                Some(rest) => self.text = rest,
-                None => {
-                    self.skip_line();
-                    return Ok(fields);
-                }
-            }
+            let Some(rest) = self.text.strip_prefix(separator) else {
+                self.skip_line();
+                return Ok(fields);
+            };
+            self.text = rest;
         }
     }
 
