@@ -50,8 +50,7 @@ fn world() -> tempfile::TempDir {
     let at = |name: &str| folder.path().join(name);
     let distances = Array2::from_shape_fn((3, 4), |(row, column)| DISTANCES[row][column]);
     // References are unit vectors: the nearest is the one whose axis the query is longest along.
-    let queries = distances.mapv(|it| 10.0 - it as f32);
-    npy::write_f32(&at("q.npy"), queries.view()).unwrap();
+    npy::write_f64(&at("q.npy"), distances.mapv(|it| 10.0 - it).view()).unwrap();
     npy::write_f32(&at("db.npy"), Array2::eye(4).view()).unwrap();
     npy::write_f64(&at("distances.npy"), distances.view()).unwrap();
     npy::write_f64(&at("similarities.npy"), distances.mapv(|it| -it).view()).unwrap();

@@ -75,7 +75,7 @@ pub(crate) struct EvaluateArgs {
     /// The same as distances; lower is nearer
     #[arg(long, value_name = "FILE", conflicts_with = "database_folder")]
     pub(super) distances: Option<PathBuf>,
-    /// The rows of the scores are the references, as VPR_Tutorial has them
+    /// The rows of the scores are the references, as the tutorial of VPR has them
     #[arg(long)]
     pub(super) scores_transposed: bool,
     /// Poses of the references: a table, or any format of docs/formats.md; by name if both files
@@ -167,7 +167,7 @@ fn print(
     let mut text = result::line(&args.recall_values, &retrieved.ranking, truth)? + "\n";
     if let Some(alone) = &retrieved.alone {
         let line = result::line(&args.recall_values, alone, truth)?;
-        text += &format!("{line} (images one by one)\n");
+        text += &(line + " (images one by one)\n");
     }
     if args.auc_pr {
         text += &(result::auc_pr_line(retrieved, truth)? + "\n");

@@ -101,12 +101,11 @@ impl Named {
 
     fn of_parts(parts: Parts, n: usize, place: &Path) -> Self {
         let Parts { names, poses, about, .. } = parts;
-        let named = match names {
-            Some(names) => Self::images(names.iter().map(PathBuf::from).collect(), poses, place),
-            None => {
-                let numbers = (0..n).map(|row| PathBuf::from(row.to_string())).collect();
-                Self { has_names: false, ..Self::images(numbers, poses, place) }
-            }
+        let named = if let Some(names) = names {
+            Self::images(names.iter().map(PathBuf::from).collect(), poses, place)
+        } else {
+            let numbers = (0..n).map(|row| PathBuf::from(row.to_string())).collect();
+            Self { has_names: false, ..Self::images(numbers, poses, place) }
         };
         Self { coordinates: about.coordinates, ..named }
     }

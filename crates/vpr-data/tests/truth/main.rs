@@ -383,14 +383,12 @@ fn scores_are_read_in_every_type_and_checked() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     let values = [0.5_f64, 1.0, 0.25, 2.0, 0.0, 4.0];
+    let single = [0.5_f32, 1.0, 0.25, 2.0, 0.0, 4.0];
     let half = [0x3800_u16, 0x3c00, 0x3400, 0x4000, 0, 0x4400];
     fs::write(path("d.npy"), npy("<f8", false, &[2, 3], &values.map(f64::to_le_bytes).concat()))
         .unwrap();
-    fs::write(
-        path("f.npy"),
-        npy("<f4", false, &[2, 3], &values.map(|it| (it as f32).to_le_bytes()).concat()),
-    )
-    .unwrap();
+    fs::write(path("f.npy"), npy("<f4", false, &[2, 3], &single.map(f32::to_le_bytes).concat()))
+        .unwrap();
     fs::write(path("h.npy"), npy("<f2", false, &[2, 3], &half.map(u16::to_le_bytes).concat()))
         .unwrap();
     fs::write(path("a.txt"), "0.5 1 0.25\n2 0 4e0\n").unwrap();

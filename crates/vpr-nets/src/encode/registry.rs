@@ -254,9 +254,10 @@ impl Method {
                 .filter(|&&it| it != dimension && self.file(it) != self.file(dimension));
             let at_hand = others.filter(|&&it| self.locate(it, roots).is_some());
             let at_hand: Vec<_> = at_hand.map(ToString::to_string).collect();
-            let hint = match at_hand.is_empty() {
-                true => String::new(),
-                false => format!("; at hand for `--descriptors-dimension` {}", at_hand.join(", ")),
+            let hint = if at_hand.is_empty() {
+                String::new()
+            } else {
+                format!("; at hand for `--descriptors-dimension` {}", at_hand.join(", "))
             };
             let reason = format!(
                 "not in weights/ or models/ of {}; it is from {}{hint}",
