@@ -21,7 +21,7 @@ pub(crate) struct ScoresArgs {
     scores_transposed: bool,
 }
 
-/// How far a cosine may be outside of −1 to 1 by rounding.
+/// How far a cosine may be outside of −1 to 1, or a distance below 0, by rounding.
 const ROUNDING: f64 = 1e-5;
 
 /// A matrix as a retrieval is made of it.
@@ -41,6 +41,14 @@ impl ScoresArgs {
         let similarities = read_scores(path, scale)?;
         let similarities =
             if self.scores_transposed { similarities.swapped() } else { similarities };
+        // Distances are kept as their negatives.
+        if scale == Scale::Distances
+            && let Some(((row, column), value)) =
+                similarities.view().indexed_iter().find(|it| *it.1 > ROUNDING)
+        {
+            let reason = format!("column {column} is -{value}: a distance is not negative");
+            return Err(Error::format(path, format!("row {row}"), reason));
+        }
         let is_cosine = |value: &f64| value.abs() <= 1.0 + ROUNDING;
         if scale == Scale::Similarities
             && let Some(((row, column), value)) =
@@ -88,8 +96,7 @@ impl Scores {
     #[expect(clippy::cast_possible_truncation, reason = "distances are kept in f32")]
     fn distance(&self, similarity: f64) -> f32 {
         match self.scale {
-            // Adding zero makes −0 a 0.
-            Scale::Distances => (0.0 - similarity) as f32,
+            Scale::Distances => (0.0 - similarity).max(0.0) as f32,
             Scale::Similarities => (2.0 - 2.0 * similarity).max(0.0).sqrt() as f32,
         }
     }

@@ -27,7 +27,7 @@ pub enum Scale {
 /// # Errors
 ///
 /// [`Error::Io`]; [`Error::Format`] with the line of what is no number, for another shape, and for
-/// a value that is not finite or a distance below zero.
+/// a value that is not finite.
 pub fn read_scores(path: &Path, scale: Scale) -> Result<Similarities> {
     let bytes = std::fs::read(path).map_err(Error::io(path))?;
     let values = if bytes.starts_with(b"\x93NUMPY") {
@@ -55,13 +55,7 @@ pub fn read_scores(path: &Path, scale: Scale) -> Result<Similarities> {
     };
     let values = match scale {
         Scale::Similarities => values,
-        Scale::Distances => {
-            if let Some(((row, column), value)) = values.indexed_iter().find(|it| *it.1 < 0.0) {
-                let reason = format!("column {column} is {value}: a distance is not negative");
-                return Err(Error::format(path, format!("row {row}"), reason));
-            }
-            values.mapv(|value| -value)
-        }
+        Scale::Distances => values.mapv(|value| -value),
     };
     Similarities::new(values).map_err(|err| err.in_file(path))
 }

@@ -414,7 +414,9 @@ fn scores_are_read_in_every_type_and_checked() {
     assert!(
         refused("b.txt", b"1 2\n3 x\n", Scale::Distances).contains("line 2: `x` is not a number")
     );
-    assert!(refused("b.txt", b"1 2\n3 -1\n", Scale::Distances).contains("row 1: column 1 is -1"));
+    // 1 − cosine, rounded: below zero is as near as zero.
+    fs::write(path("c.txt"), "1 2\n3 -1e-7\n").unwrap();
+    assert_eq!(read_scores(&path("c.txt"), Scale::Distances).unwrap().best().reference, [0, 1]);
     assert!(refused("b.txt", b"1 NaN\n", Scale::Similarities).contains("column 1 is NaN"));
     assert!(refused("b.txt", b"\n", Scale::Similarities).contains("no similarities"));
     assert!(
