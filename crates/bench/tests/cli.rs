@@ -255,8 +255,6 @@ fn wrong_descriptors_are_refused_by_file_and_place() {
     assert_refused(&evaluate(dir.path(), &labels), &["q.npy", "row 0", "column 1", "NaN"]);
     npy::write_f32(&dir.path().join("q.npy"), array![[1.0_f32]].view()).unwrap();
     assert_refused(&evaluate(dir.path(), &labels), &["q.npy", "expected 2, got 1"]);
-    npy::write_f64(&dir.path().join("q.npy"), array![[1.0, 2.0]].view()).unwrap();
-    assert_refused(&evaluate(dir.path(), &labels), &["q.npy", "float64", "float32"]);
     let whole = fs::read(dir.path().join("r.npy")).unwrap();
     fs::write(dir.path().join("q.npy"), &whole[..whole.len() - 3]).unwrap();
     assert_refused(&evaluate(dir.path(), &labels), &["q.npy"]);
@@ -269,7 +267,7 @@ fn poses_must_be_as_many_as_descriptors() {
     let dir = descriptors();
     fs::write(dir.path().join("q.csv"), "name,easting,northing\nx,25,0\n").unwrap();
     let poses = ["--database-poses", "r.csv", "--queries-poses", "q.csv"];
-    assert_refused(&evaluate(dir.path(), &poses), &["q.csv", "1 poses for 2 descriptors"]);
+    assert_refused(&evaluate(dir.path(), &poses), &["q.csv", "expected 2, got 1"]);
 }
 
 #[test]

@@ -16,7 +16,10 @@ pub enum Error {
     #[error(transparent)]
     Nets(#[from] vpr_nets::Error),
     /// An estimator needs more neighbours than were retrieved or than there are.
-    #[error("{estimator} needs {needed} neighbours per query, but only {available} are ranked")]
+    #[error(
+        "{estimator} needs {needed} neighbours per query, but only {available} are ranked: give \
+         fewer by `-k`, or a larger map"
+    )]
     TooFewNeighbors {
         /// The estimator.
         estimator: &'static str,
@@ -68,7 +71,10 @@ pub enum Error {
         queries: String,
     },
     /// Coordinates of different grids.
-    #[error("positions in {first} and in {second} cannot be compared")]
+    #[error(
+        "positions in {first} and in {second} cannot be compared; `--zone` puts positions in degrees \
+         into one zone"
+    )]
     OtherCoordinates {
         /// Coordinates of the map.
         first: String,

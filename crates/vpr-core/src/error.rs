@@ -52,6 +52,16 @@ pub enum Error {
     /// Something that must have at least one element has none.
     #[error("no {0}")]
     Empty(&'static str),
+    /// What must be there once is there twice.
+    #[error("{kind} `{name}` stands in rows {} and {}", rows[0], rows[1])]
+    Repeated {
+        /// What it is.
+        kind: &'static str,
+        /// Its name.
+        name: String,
+        /// Two of the rows it stands in, counted from 0.
+        rows: [usize; 2],
+    },
     /// An index points outside of what it refers to.
     #[error("{what} {index}: only {len} exist")]
     OutOfRange {

@@ -125,15 +125,7 @@ impl<'a> Evaluation<'a> {
     /// [`Error::Mismatch`] if they are not equally many, [`Error::NotFinite`] names the query whose
     /// uncertainty is not finite.
     pub fn new(uncertainty: &[f64], judged: &'a Judged) -> Result<Self> {
-        let (expected, actual) = (judged.len(), uncertainty.len());
-        if expected != actual {
-            let what = "uncertainties, one per query";
-            return Err(Error::Mismatch { what, expected, actual });
-        }
-        if let Some(row) = uncertainty.iter().position(|it| !it.is_finite()) {
-            let value = uncertainty[row];
-            return Err(Error::NotFinite { what: "uncertainties", row, column: 0, value });
-        }
+        check("uncertainties", uncertainty, judged)?;
         Ok(Self::ordered(uncertainty.iter().map(|it| 0.0 - it).collect(), judged))
     }
 
@@ -144,15 +136,7 @@ impl<'a> Evaluation<'a> {
     ///
     /// As [`Self::new`].
     pub fn of_confidence(confidence: &[f64], judged: &'a Judged) -> Result<Self> {
-        let (expected, actual) = (judged.len(), confidence.len());
-        if expected != actual {
-            let what = "confidences, one per query";
-            return Err(Error::Mismatch { what, expected, actual });
-        }
-        if let Some(row) = confidence.iter().position(|it| !it.is_finite()) {
-            let value = confidence[row];
-            return Err(Error::NotFinite { what: "confidences", row, column: 0, value });
-        }
+        check("confidences", confidence, judged)?;
         // Adding zero makes −0 a 0, so that equal numbers are neighbours in the total order.
         Ok(Self::ordered(confidence.iter().map(|it| 0.0 + it).collect(), judged))
     }
@@ -324,6 +308,18 @@ impl<'a> Evaluation<'a> {
     }
 }
 
+/// One finite value per judged query.
+fn check(what: &'static str, values: &[f64], judged: &Judged) -> Result<()> {
+    let (expected, actual) = (judged.len(), values.len());
+    if expected != actual {
+        return Err(Error::Mismatch { what, expected, actual });
+    }
+    match values.iter().position(|it| !it.is_finite()) {
+        None => Ok(()),
+        Some(row) => Err(Error::NotFinite { what, row, column: 0, value: values[row] }),
+    }
+}
+
 /// `None` instead of an error that says there is no value.
 fn defined(value: Result<f64>) -> Result<Option<f64>> {
     match value {
@@ -390,5 +386,18 @@ mod tests {
         let judged = Judged::from_flags(vec![true, false], vec![true; 2]).unwrap();
         let err = Evaluation::new(&[0.0, f64::NAN], &judged).unwrap_err().to_string();
         assert!(err.contains("row 1"), "{err}");
+        let err = Evaluation::of_confidence(&[0.0, f64::INFINITY], &judged).unwrap_err();
+        assert_eq!(err.to_string(), "confidences: row 1, column 0 is inf, not a finite number");
+    }
+
+    #[test]
+    fn there_is_one_value_per_query() {
+        let judged = Judged::from_flags(vec![true, false], vec![true; 2]).unwrap();
+        for err in [
+            Evaluation::new(&[0.0], &judged).unwrap_err(),
+            Evaluation::of_confidence(&[0.0; 3], &judged).unwrap_err(),
+        ] {
+            assert!(matches!(err, Error::Mismatch { expected: 2, .. }), "{err}");
+        }
     }
 }

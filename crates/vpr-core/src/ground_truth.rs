@@ -1,5 +1,7 @@
 //! Which references are correct for which query.
 
+use std::{collections::HashMap, hash::Hash};
+
 use crate::{Error, Poses, Result};
 
 /// The correct references of every query.
@@ -88,6 +90,43 @@ impl GroundTruth {
             })
             .collect();
         Self { correct, n_references }
+    }
+
+    /// A reference is correct if it has the label of the query: the place, floor or class that
+    /// images were sorted into. A query whose label no reference has is a new place.
+    #[must_use]
+    pub fn same_label<L: Eq + Hash>(queries: &[L], references: &[L]) -> Self {
+        let mut of_label: HashMap<&L, Vec<usize>> = HashMap::new();
+        for (index, label) in references.iter().enumerate() {
+            of_label.entry(label).or_default().push(index);
+        }
+        let correct = queries.iter().map(|it| of_label.get(it).cloned().unwrap_or_default());
+        Self { correct: correct.collect(), n_references: references.len() }
+    }
+
+    /// The truth for some of the queries and some of the references, each in this order; indices are
+    /// then places in these lists.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::OutOfRange`] if there is no such query or reference.
+    pub fn selected(&self, queries: &[usize], references: &[usize]) -> Result<Self> {
+        let check =
+            |what, indices: &[usize], len: usize| match indices.iter().find(|&&it| it >= len) {
+                Some(&index) => Err(Error::OutOfRange { what, index, len }),
+                None => Ok(()),
+            };
+        check("query", queries, self.len())?;
+        check("reference", references, self.n_references)?;
+        let mut places = vec![Vec::new(); self.n_references];
+        for (place, &reference) in references.iter().enumerate() {
+            places[reference].push(place);
+        }
+        let of = |&query: &usize| {
+            self.correct[query].iter().flat_map(|&it| places[it].iter().copied()).collect()
+        };
+        let lists: Vec<Vec<usize>> = queries.iter().map(of).collect();
+        Ok(Self::clamped(lists, references.len()).0)
     }
 
     /// The same truth with queries and references exchanged.
@@ -214,6 +253,26 @@ mod tests {
         let lists: Vec<_> = (0..4).map(|query| truth.correct(query).to_vec()).collect();
         assert_eq!(lists, [vec![0, 1], vec![0, 1, 2], vec![1, 2], vec![2]]);
         assert!(GroundTruth::within_frames(9, 3, 1).is_new_place(8));
+    }
+
+    #[test]
+    fn images_of_one_label_are_one_place() {
+        let truth = GroundTruth::same_label(&["b", "z", "a"], &["a", "b", "a"]);
+        let lists: Vec<_> = (0..3).map(|query| truth.correct(query).to_vec()).collect();
+        assert_eq!(lists, [vec![1], vec![], vec![0, 2]]);
+        assert_eq!((truth.n_references(), truth.n_known()), (3, 2));
+    }
+
+    #[test]
+    fn what_is_left_out_is_no_longer_correct() {
+        let truth = GroundTruth::from_lists(vec![vec![0, 2], vec![1], vec![2]], 3).unwrap();
+        let left = truth.selected(&[0, 1], &[2, 0]).unwrap();
+        assert_eq!((left.len(), left.n_references()), (2, 2));
+        assert_eq!(left.correct(0), [0, 1]);
+        assert!(left.is_new_place(1));
+        assert_eq!(truth.selected(&[0, 1, 2], &[0, 1, 2]).unwrap(), truth);
+        assert!(matches!(truth.selected(&[3], &[0]), Err(Error::OutOfRange { index: 3, .. })));
+        assert!(matches!(truth.selected(&[0], &[7]), Err(Error::OutOfRange { index: 7, .. })));
     }
 
     #[test]

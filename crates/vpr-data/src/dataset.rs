@@ -57,7 +57,8 @@ impl Dataset {
     fn open_vpr_bench(entry: &DatasetEntry, folder: &Path) -> Result<Self> {
         let queries = image_folder(&folder.join("query"))?;
         let references = image_folder(&folder.join("ref"))?;
-        let file = GroundTruthFile::read(&folder.join("ground_truth_new.npy"))?;
+        let path = folder.join("ground_truth_new.npy");
+        let (file, _) = GroundTruthFile::read_for(&path, queries.len(), references.len())?;
         if file.len() != queries.len() {
             let reason = format!("{}, but query/ has {} images", file.len(), queries.len());
             return Err(Error::format(file.path, "number of rows", reason));
@@ -116,6 +117,12 @@ impl Dataset {
             let reason = "positions need a tolerance in metres";
             return Err(Error::Parameter { name: "dataset", value: entry.id.clone(), reason });
         };
+        if let (Some(first), Some(second)) = (queries.zone, references.zone)
+            && first != second
+        {
+            let reason = format!("queries lie in UTM zone {first}, the database in {second}");
+            return Err(Error::format(folder, "file names", reason));
+        }
         let poses = (queries.poses(), references.poses());
         let truth = GroundTruth::within_radius(&poses.0, &poses.1, radius)?;
         let dataset = Self::new(entry, queries.images, references.images, truth);

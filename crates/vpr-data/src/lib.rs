@@ -17,12 +17,15 @@ pub mod exchange;
 pub mod layout;
 pub mod manifest;
 mod open;
+pub mod truth;
 pub mod validate;
+mod zone;
 
 pub use dataset::Dataset;
 pub use manifest::{DataRoots, DatasetEntry, Layout, Manifest, Tolerance};
-pub use open::{Datasets, Generator};
-pub use validate::{Problem, Severity, validate};
+pub use open::{AtHand, Datasets, Generator};
+pub use validate::{Problem, Severity, validate, validate_with};
+pub use zone::ZoneChoice;
 
 /// The examples of the README, as tests.
 #[cfg(doctest)]

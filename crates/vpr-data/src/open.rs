@@ -40,6 +40,17 @@ pub trait Generator: Sync + Send {
     ) -> Result<Dataset>;
 }
 
+/// What of a dataset is there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AtHand {
+    /// Its images.
+    pub images: bool,
+    /// What is correct, as a file or by order and positions of the images.
+    pub truth: bool,
+    /// Scores that its authors stored.
+    pub scores: bool,
+}
+
 /// Makes nothing: all datasets are those of the manifest.
 impl Generator for () {
     fn makes(&self, _: &str) -> bool {
@@ -130,19 +141,45 @@ impl Datasets {
             return self.generator.open(id, &self.roots, &self.cache, observer).map(Some);
         }
         let entry = self.manifest.find(id)?;
-        let Some(folder) = self.roots.locate(&entry.path)? else { return Ok(None) };
+        match (entry.layout, self.images(entry)?) {
+            (_, None) => Ok(None),
+            (Layout::Npz, Some(folder)) => unpack(entry, &folder, &self.cache).map(Some),
+            (_, Some(_)) => Dataset::open(entry, &self.roots).map(Some),
+        }
+    }
+
+    /// Where the images of a dataset are, if they are in the folders. Ground truths, scores and lists
+    /// of poses are published without them.
+    fn images(&self, entry: &DatasetEntry) -> Result<Option<PathBuf>> {
         let images = match entry.layout {
             Layout::VprBench | Layout::ImagePairs => "query",
             Layout::UtmNames => "queries",
-            // Lists of poses are published without the images.
-            Layout::SevenScenes if !folder.join("seq-01").is_dir() => return Ok(None),
-            Layout::SevenScenes => ".",
-            Layout::Npz => return unpack(entry, &folder, &self.cache).map(Some),
+            Layout::SevenScenes => "seq-01",
+            Layout::Npz => return self.roots.locate(&entry.path),
             Layout::InvarianceScores => return Ok(None),
         };
-        // Ground truths are published without the images.
-        let images = self.roots.locate(&entry.path.join(images))?;
-        images.map(|_| Dataset::open(entry, &self.roots)).transpose()
+        self.roots.locate(&entry.path.join(images))
+    }
+
+    /// What of a dataset is in the folders; nothing is opened.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Io`] if a folder cannot be looked into.
+    pub fn at_hand(&self, entry: &DatasetEntry) -> Result<AtHand> {
+        let is_there = |path: &Path| Ok::<_, Error>(self.roots.locate(path)?.is_some());
+        let images = self.images(entry)?.is_some();
+        let truth = match entry.layout {
+            Layout::VprBench => is_there(&entry.path.join("ground_truth_new.npy"))?,
+            // It follows from order or positions.
+            _ => images,
+        };
+        let scores = match (&entry.matches, entry.layout) {
+            (Some(matches), _) => is_there(matches)?,
+            (None, Layout::InvarianceScores) => is_there(&entry.path)?,
+            (None, _) => false,
+        };
+        Ok(AtHand { images, truth, scores })
     }
 
     /// One line that says what is missing and where to get it.

@@ -6,10 +6,15 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use crate::layout::{
-    seven_scenes,
-    utm_names::{UtmFolder, parse_name},
-    vpr_bench::{GroundTruthFile, image_number, is_image},
+use crate::{
+    layout::{
+        folder::{images_of, is_hidden},
+        numbered::images_in_order,
+        seven_scenes,
+        utm_names::{UtmFolder, parse_name},
+        vpr_bench::{GroundTruthFile, image_number, is_image},
+    },
+    truth::{self, Source},
 };
 use vpr_core::{Error, Result};
 
@@ -56,10 +61,22 @@ impl fmt::Display for Problem {
 /// `ground_truth_new.npy`) or of positions in names (`queries/`, `database/`).
 #[must_use]
 pub fn validate(folder: &Path, probe: Probe<'_>) -> Vec<Problem> {
+    validate_with(folder, probe, None)
+}
+
+/// [`validate`] with a truth from elsewhere: that is checked, and neither a ground truth in the folder
+/// nor positions in names are asked for.
+#[must_use]
+pub fn validate_with(folder: &Path, probe: Probe<'_>, truth: Option<&Source>) -> Vec<Problem> {
     let mut report = Report { problems: Vec::new(), probe };
     let has = |name: &str| folder.join(name).exists();
     if !folder.is_dir() {
         report.error(folder, "", "is not a folder");
+    } else if let (Some(truth), Some(sides)) = (truth, sides(folder)) {
+        let [queries, references] = sides.map(|name| folder.join(name));
+        report.plain_images(&queries);
+        report.plain_images(&references);
+        report.problems.extend(truth::problems(truth, &queries, &references));
     } else if has("queries") || has("database") {
         report.utm_names(&folder.join("queries"));
         report.utm_names(&folder.join("database"));
@@ -74,6 +91,12 @@ pub fn validate(folder: &Path, probe: Probe<'_>) -> Vec<Problem> {
         report.error(folder, "", reason);
     }
     report.problems
+}
+
+/// The folders of queries and references, if there are any that are called so.
+fn sides(folder: &Path) -> Option<[&'static str; 2]> {
+    let known = [["queries", "database"], ["query", "ref"]];
+    known.into_iter().find(|names| names.iter().any(|name| folder.join(name).is_dir()))
 }
 
 struct Report<'a> {
@@ -121,6 +144,10 @@ impl Report<'_> {
     fn numbered_images(&mut self, folder: &Path) -> usize {
         let mut numbered: BTreeMap<u64, Vec<PathBuf>> = BTreeMap::new();
         for path in self.entries(folder) {
+            if !is_image(&path) {
+                self.warning(&path, "", "is no .jpg, .jpeg or .png image, and not looked at");
+                continue;
+            }
             match image_number(&path) {
                 Ok(number) => numbered.entry(number).or_default().push(path),
                 Err(reason) => self.error(&path, "", reason),
@@ -148,6 +175,17 @@ impl Report<'_> {
         images.len()
     }
 
+    /// Checks the images of a folder, whatever they are called.
+    fn plain_images(&mut self, folder: &Path) {
+        // A folder that cannot be listed is the truth's problem.
+        if let Ok(listing) = images_in_order(folder) {
+            for note in &listing.notes {
+                self.warning(folder, "", note);
+            }
+            self.images(folder, &listing.images);
+        }
+    }
+
     /// Checks `queries/` or `database/`.
     fn utm_names(&mut self, folder: &Path) {
         if !folder.is_dir() {
@@ -160,6 +198,9 @@ impl Report<'_> {
                 if sorted.len() > 1 && sorted[0] == sorted[sorted.len() - 1] {
                     self.warning(folder, "", "all images have the same position");
                 }
+                for note in &opened.notes {
+                    self.warning(folder, "", note);
+                }
                 self.images(folder, &opened.images);
             }
             Err(Error::Format { path, .. }) if is_image(&path) => self.names_below(folder),
@@ -167,16 +208,16 @@ impl Report<'_> {
         }
     }
 
-    /// Names every file whose name has no position.
+    /// Names every image whose name has no position.
     fn names_below(&mut self, folder: &Path) {
-        for path in self.entries(folder) {
-            if path.is_dir() {
-                self.names_below(&path);
-            } else if is_image(&path) {
-                match parse_name(&path) {
-                    Ok(_) => self.images(folder, &[path]),
-                    Err(reason) => self.error(&path, "file name", reason),
-                }
+        let listing = match images_of(folder) {
+            Ok(listing) => listing,
+            Err(err) => return self.failure(folder, err),
+        };
+        for image in listing.images {
+            match parse_name(&image) {
+                Ok(_) => self.images(folder, &[image]),
+                Err(reason) => self.error(&image, "file name", reason),
             }
         }
     }
@@ -192,9 +233,6 @@ impl Report<'_> {
                 self.error(folder, "", cause.to_string());
                 return Vec::new();
             }
-        };
-        let is_hidden = |path: &PathBuf| {
-            path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
         };
         paths.retain(|path| !is_hidden(path));
         paths.sort();
@@ -222,8 +260,13 @@ impl Report<'_> {
     }
 
     fn ground_truth(&mut self, path: &Path, n_queries: usize, n_references: usize) {
-        let file = match GroundTruthFile::read(path) {
-            Ok(file) => file,
+        let file = match GroundTruthFile::read_for(path, n_queries, n_references) {
+            Ok((file, notes)) => {
+                for note in notes {
+                    self.warning(path, "", note);
+                }
+                file
+            }
             Err(err) => return self.failure(path, err),
         };
         if file.len() != n_queries {

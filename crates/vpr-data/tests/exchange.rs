@@ -15,7 +15,8 @@ use vpr_core::{
     Descriptors, Error, PlanarPosition, Pose, Poses,
     map::{About, Coordinates, Names, UtmZone},
 };
-use vpr_data::exchange::{self, Format, PairList, Pairs, Parts};
+use vpr_data::exchange::{self, Direction, Format, PairList, Pairs, Parts, Reading};
+use vpr_files::npy;
 
 const N: usize = 7;
 
@@ -81,8 +82,8 @@ fn descriptors_pass_every_door_bit_by_bit() {
 
 #[test]
 fn poses_pass_every_door() {
-    use Format::{HlocPoses, Kapture, Kitti, PoseCsv, SevenScenes, Tum};
-    for format in [HlocPoses, Kapture, Kitti, PoseCsv, Tum] {
+    use Format::{Colmap, HlocPoses, Kapture, Kitti, PoseCsv, SevenScenes, Tum};
+    for format in [HlocPoses, Colmap, Kapture, Kitti, PoseCsv, Tum] {
         let read = round_trip(format, &parts());
         assert_close(&read.poses.unwrap(), &poses());
         if !matches!(format, Kitti | Tum) {
@@ -158,7 +159,7 @@ fn a_zone_crossing_is_refused_with_its_lines() {
     let path = folder.path().join("gps.csv");
     std::fs::write(&path, "name,lat,lon\na,52.0,5.9\nb,52.0,6.1\n").unwrap();
     let err = exchange::read(Format::LatLon, &path).unwrap_err().to_string();
-    assert!(err.contains("crosses UTM zones: 31N (line 2), 32N (line 3)"), "{err}");
+    assert!(err.contains("different UTM zones: 31N (1, line 2), 32N (1, line 3)"), "{err}");
 }
 
 #[test]
@@ -177,6 +178,127 @@ fn formats_without_orientation_are_not_given_one() {
     let parts = Parts { poses: Some(planar), ..parts() };
     let err = exchange::write(Format::Tum, &folder.path().join("tum.txt"), &parts).unwrap_err();
     assert!(matches!(err, Error::PoseKind { .. }), "{err}");
+}
+
+#[test]
+fn parts_that_say_nothing_alone_are_refused_and_poses_may_stand_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    let npz = |arrays: &[&str]| {
+        let mut archive = npy::npz::Writer::new(std::fs::File::create(&path).unwrap());
+        for array in arrays {
+            let (descr, shape): (_, &[usize]) = match *array {
+                "positions" => ("<i4", &[2, 3]),
+                "orientations" => ("<f4", &[2, 4]),
+                "names" => ("|u1", &[2]),
+                "name_offsets" => ("<i8", &[3]),
+                _ => ("<f4", &[2, 2]),
+            };
+            let n: usize = shape.iter().product();
+            let size = if descr == "<i8" { 8 } else { 4 };
+            let size = if descr == "|u1" { 1 } else { size };
+            archive.add(array, descr, shape, (0..n * size).map(|_| [0])).unwrap();
+        }
+        archive.finish().unwrap();
+        exchange::read(Format::Npz, &path).map_err(|err| err.to_string())
+    };
+    let alone = npz(&["positions"]).unwrap();
+    assert_eq!((alone.descriptors, alone.poses.unwrap().len()), (None, 2));
+    // One matrix of numbers is that of descriptors, whatever it is called.
+    assert_eq!(npz(&["arr_0"]).unwrap().descriptors.unwrap().len(), 2);
+    for (arrays, expected) in [
+        (&["arr_0", "arr_1"][..], "several matrices are: arr_0, arr_1"),
+        (&["descriptors", "orientations"], "no `positions`"),
+        (&["descriptors", "names"], "no `name_offsets`"),
+        (&["descriptors", "name_offsets"], "no `names`"),
+        (&["descriptors", "positions", "orientations"], "length 0"),
+    ] {
+        let err = npz(arrays).unwrap_err();
+        assert!(err.contains(expected), "{arrays:?}: {err}");
+    }
+}
+
+#[test]
+fn tensors_of_every_type_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.safetensors");
+    let read = |dtype: &str, bytes: &[u8]| {
+        let (n, length) = (bytes.len(), bytes.len() / 2);
+        let length = if dtype == "BF16" || dtype == "F16" { length / 2 } else { length / 8 };
+        let header =
+            format!(r#"{{"x":{{"dtype":"{dtype}","shape":[2,{length}],"data_offsets":[0,{n}]}}}}"#);
+        let size = (header.len() as u64).to_le_bytes();
+        std::fs::write(&path, [&size, header.as_bytes(), bytes].concat()).unwrap();
+        let parts = exchange::read(Format::Safetensors, &path).unwrap();
+        let rows = parts.descriptors.unwrap().into_inner();
+        (rows.iter().copied().collect::<Vec<f32>>(), parts.notes)
+    };
+    // 1.5 and −2, twice each.
+    let brain: Vec<u8> = [0x3fc0_u16, 0xc000].iter().flat_map(|it| it.to_le_bytes()).collect();
+    assert_eq!(read("BF16", &brain.repeat(2)), (vec![1.5, -2.0, 1.5, -2.0], vec![]));
+    let half: Vec<u8> = [0x3e00_u16, 0xc000].iter().flat_map(|it| it.to_le_bytes()).collect();
+    assert_eq!(read("F16", &half).0, [1.5, -2.0]);
+    let doubles: Vec<u8> = [0.1_f64, 3.0].iter().flat_map(|it| it.to_le_bytes()).collect();
+    let (rows, notes) = read("F64", &doubles);
+    assert_eq!(rows, [0.1, 3.0]);
+    assert!(notes[0].ends_with("`x` are float64, rounded to float32"), "{notes:?}");
+    let whole: Vec<u8> = [-7_i64, 8].iter().flat_map(|it| it.to_le_bytes()).collect();
+    assert_eq!(read("I64", &whole).0, [-7.0, 8.0]);
+}
+
+#[test]
+fn a_table_beside_descriptors_must_fit_or_be_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("d.npy");
+    exchange::write(Format::Npy, &path, &parts()).unwrap();
+    let read = |text: &str| {
+        std::fs::write(folder.path().join("d.csv"), text).unwrap();
+        exchange::read(Format::Npy, &path)
+    };
+    let err = read("name,x,y\na,1,2\n").unwrap_err().to_string();
+    assert!(err.ends_with("d.csv: rows: has 1 poses for the 7 descriptors beside it"), "{err}");
+    let none = read("a,b\n1,2\n").unwrap();
+    assert_eq!((none.names, none.poses), (None, None));
+    assert!(
+        none.notes[0].ends_with("d.csv: is no table of poses, and not used"),
+        "{:?}",
+        none.notes
+    );
+    // And it is not written over.
+    let err = exchange::write(Format::Npy, &path, &parts()).unwrap_err().to_string();
+    assert!(err.contains("d.csv"), "{err}");
+}
+
+#[test]
+fn directions_are_named_only_where_files_leave_them_open() {
+    let folder = tempfile::tempdir().unwrap();
+    let (tum, kitti) = (folder.path().join("a.tum"), folder.path().join("a.kitti"));
+    // At (1, 2, 3), turned by 90° about z; the files hold the inverse of that.
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    std::fs::write(&tum, format!("0 -2 1 -3 0 0 {} {half}\n", -half)).unwrap();
+    let reading = Reading { direction: Some(Direction::CameraFromWorld), ..Reading::default() };
+    let read = exchange::read_with(Format::Tum, &tum, reading).unwrap();
+    let expected = Pose::from_parts(
+        [1.0, 2.0, 3.0].into(),
+        UnitQuaternion::new(Vector3::z() * std::f64::consts::FRAC_PI_2),
+    );
+    assert_close(&read.poses.unwrap(), &Poses::SixDof(vec![expected]));
+    std::fs::write(&kitti, "1 0 0 0 0 1 0 0 0 0 1 0\n").unwrap();
+    let err = exchange::read_with(Format::Kitti, &kitti, reading).unwrap_err().to_string();
+    assert!(err.contains("camera-from-world, of kitti"), "{err}");
+}
+
+#[test]
+fn what_a_format_has_no_place_for_is_named() {
+    let left_out = |format| exchange::left_out(format, &parts());
+    assert_eq!(left_out(Format::Npz), Vec::<&str>::new());
+    assert_eq!(left_out(Format::Npy), Vec::<&str>::new());
+    assert_eq!(left_out(Format::HlocH5), ["poses"]);
+    assert_eq!(left_out(Format::PoseCsv), ["descriptors"]);
+    // Neither time stamps nor frames.
+    assert_eq!(left_out(Format::Tum), ["descriptors", "names"]);
+    assert_eq!(left_out(Format::SevenScenes), ["descriptors", "names"]);
+    assert_eq!(left_out(Format::VprEval), ["poses", "names"]);
 }
 
 fn data(place: &str) -> Option<PathBuf> {

@@ -14,10 +14,18 @@ pub(crate) enum Kind {
     U16,
     U32,
     U64,
+    F16,
     F32,
     F64,
     Object,
+    /// Text of fixed length, as many UTF-32 characters.
+    Text(u32),
+    /// Text of fixed length, as many bytes.
+    Bytes(u32),
 }
+
+/// Texts of fixed length are no longer than this; a path is not.
+const MAX_TEXT: u32 = 1 << 16;
 
 /// An element type with its byte order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +35,7 @@ pub(crate) struct Dtype {
 }
 
 impl Dtype {
-    /// Parses NumPy's short form, with or without byte order: `<f8`, `f8`, `|b1`, `O`.
+    /// Parses NumPy's short form, with or without byte order: `<f8`, `f8`, `|b1`, `O`, `<U5`, `|S5`.
     pub(crate) fn parse(descr: &str) -> Option<Self> {
         let (order, name) = match descr.as_bytes().first()? {
             b'<' | b'>' | b'|' => descr.split_at(1),
@@ -43,14 +51,26 @@ impl Dtype {
             "u2" => Kind::U16,
             "u4" => Kind::U32,
             "u8" => Kind::U64,
+            "f2" => Kind::F16,
             "f4" => Kind::F32,
             "f8" => Kind::F64,
             "O" | "O4" | "O8" => Kind::Object,
-            _ => return None,
+            _ => Self::text(name)?,
         };
-        let has_order = kind.size() > 1;
+        let has_order = kind.size() > 1 && !matches!(kind, Kind::Bytes(_));
         (order.is_empty() || (order == "|") != has_order)
             .then_some(Self { kind, big_endian: order == ">" })
+    }
+
+    /// `U5` or `S5`; texts without room for a character are refused, since any number of them would
+    /// fit into a file.
+    fn text(name: &str) -> Option<Kind> {
+        let length = |digits: &str| digits.parse().ok().filter(|it| (1..=MAX_TEXT).contains(it));
+        match name.split_at_checked(1)? {
+            ("U", digits) => length(digits).map(Kind::Text),
+            ("S", digits) => length(digits).map(Kind::Bytes),
+            _ => None,
+        }
     }
 
     /// Sets the byte order to `<`, `>` or `|` (does not matter); `false` if it is none of these.
@@ -65,7 +85,7 @@ impl Dtype {
 
     /// The numbers in `bytes`; what is left of an incomplete last element is ignored.
     ///
-    /// `None` for objects, and if an unsigned integer does not fit i64.
+    /// `None` for objects, if an unsigned integer does not fit i64, and if a text is none.
     pub(crate) fn decode(self, bytes: &[u8]) -> Option<Elements> {
         Some(match self.kind {
             Kind::Object => return None,
@@ -81,8 +101,24 @@ impl Dtype {
                 let checked = self.map(bytes, |b| i64::try_from(u64::from_le_bytes(b)).ok());
                 Elements::Int(checked.into_iter().collect::<Option<_>>()?)
             }
+            Kind::F16 => Elements::F32(self.map(bytes, |b| half::f16::from_le_bytes(b).to_f32())),
             Kind::F32 => Elements::F32(self.map(bytes, f32::from_le_bytes)),
             Kind::F64 => Elements::F64(self.map(bytes, f64::from_le_bytes)),
+            Kind::Text(_) => {
+                let texts = bytes.chunks_exact(self.kind.size()).map(|text| {
+                    let codes: Vec<u32> = self.map(text, u32::from_le_bytes);
+                    let end = codes.iter().rposition(|&code| code != 0).map_or(0, |last| last + 1);
+                    codes[..end].iter().map(|&code| char::from_u32(code)).collect()
+                });
+                Elements::Text(texts.collect::<Option<_>>()?)
+            }
+            Kind::Bytes(_) => {
+                let texts = bytes.chunks_exact(self.kind.size()).map(|text| {
+                    let end = text.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+                    std::str::from_utf8(&text[..end]).map(str::to_owned)
+                });
+                Elements::Text(texts.collect::<Result<_, _>>().ok()?)
+            }
         })
     }
 
@@ -104,9 +140,11 @@ impl Kind {
     pub(crate) fn size(self) -> usize {
         match self {
             Self::Bool | Self::I8 | Self::U8 | Self::Object => 1,
-            Self::I16 | Self::U16 => 2,
+            Self::I16 | Self::U16 | Self::F16 => 2,
             Self::I32 | Self::U32 | Self::F32 => 4,
             Self::I64 | Self::U64 | Self::F64 => 8,
+            Self::Text(length) => 4 * length as usize,
+            Self::Bytes(length) => length as usize,
         }
     }
 
@@ -122,9 +160,12 @@ impl Kind {
             Self::U16 => "uint16",
             Self::U32 => "uint32",
             Self::U64 => "uint64",
+            Self::F16 => "float16",
             Self::F32 => "float32",
             Self::F64 => "float64",
             Self::Object => "object",
+            Self::Text(_) => "str",
+            Self::Bytes(_) => "bytes",
         }
     }
 }
@@ -145,7 +186,10 @@ mod tests {
         assert!(Dtype::parse(">f8").unwrap().big_endian);
         assert!(!Dtype::parse("f8").unwrap().big_endian);
         assert_eq!(Dtype::parse("|O").unwrap().kind, Kind::Object);
-        for bad in ["|f8", "<u1", "f2", "<c16", "", "<", "|S5", "<M8[ns]"] {
+        assert_eq!(Dtype::parse("<U5").unwrap().kind, Kind::Text(5));
+        assert_eq!(Dtype::parse("|S5").unwrap().kind, Kind::Bytes(5));
+        for bad in ["|f8", "<u1", "<c16", "", "<", "<S5", "|U5", "<U0", "|S", "<U9999999999", "é"]
+        {
             assert_eq!(Dtype::parse(bad), None, "{bad}");
         }
     }
@@ -157,5 +201,19 @@ mod tests {
         let little = Dtype::parse("<f4").unwrap().decode(&1.5_f32.to_le_bytes());
         assert_eq!(little, Some(Elements::F32(vec![1.5])));
         assert_eq!(Dtype::parse("<u8").unwrap().decode(&[255; 8]), None);
+        let half = Dtype::parse(">f2").unwrap().decode(&[0x3c, 0, 0xc0, 0]);
+        assert_eq!(half, Some(Elements::F32(vec![1.0, -2.0])));
+    }
+
+    #[test]
+    fn texts_end_before_their_padding_and_must_be_text() {
+        let texts =
+            |texts: &[&str]| Some(Elements::Text(texts.iter().map(|&it| it.into()).collect()));
+        let utf_32: Vec<u8> =
+            ['é', '\0', 'a', 'b'].iter().flat_map(|&it| u32::from(it).to_be_bytes()).collect();
+        assert_eq!(Dtype::parse(">U2").unwrap().decode(&utf_32), texts(&["é", "ab"]));
+        assert_eq!(Dtype::parse("|S3").unwrap().decode(b"a\0\0b.c"), texts(&["a", "b.c"]));
+        assert_eq!(Dtype::parse("<U1").unwrap().decode(&0xd800_u32.to_le_bytes()), None);
+        assert_eq!(Dtype::parse("|S1").unwrap().decode(&[0xff]), None);
     }
 }

@@ -40,10 +40,12 @@ pub enum Elements {
     Bool(Vec<bool>),
     /// Any integer type.
     Int(Vec<i64>),
-    /// `float32`.
+    /// `float32`, or `float16`, which fits.
     F32(Vec<f32>),
     /// `float64`.
     F64(Vec<f64>),
+    /// Text of fixed length, without its padding.
+    Text(Vec<String>),
     /// `object`.
     Object(Vec<Value>),
 }
@@ -129,6 +131,7 @@ impl Elements {
             Self::Int(values) => values.len(),
             Self::F32(values) => values.len(),
             Self::F64(values) => values.len(),
+            Self::Text(values) => values.len(),
             Self::Object(values) => values.len(),
         }
     }
@@ -144,7 +147,7 @@ impl Elements {
     #[expect(clippy::cast_precision_loss, reason = "counts and scores, far below 2^53")]
     pub fn to_f64s(&self) -> Option<Vec<f64>> {
         match self {
-            Self::Bool(_) => None,
+            Self::Bool(_) | Self::Text(_) => None,
             Self::Int(values) => Some(values.iter().map(|&value| value as f64).collect()),
             Self::F32(values) => Some(values.iter().copied().map(f64::from).collect()),
             Self::F64(values) => Some(values.clone()),
@@ -156,7 +159,7 @@ impl Elements {
     #[must_use]
     pub fn to_i64s(&self) -> Option<Vec<i64>> {
         match self {
-            Self::Bool(_) => None,
+            Self::Bool(_) | Self::Text(_) => None,
             Self::Int(values) => Some(values.clone()),
             Self::F32(values) => values.iter().map(|&value| whole(f64::from(value))).collect(),
             Self::F64(values) => values.iter().map(|&value| whole(value)).collect(),

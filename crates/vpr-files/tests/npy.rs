@@ -48,7 +48,7 @@ fn what_is_written_is_read() {
     npy::write_f32(&path, values.t()).unwrap();
     assert_eq!(npy::read_f32(&path).unwrap(), values.t());
     npy::write_f64(&path, array![[1.0, 2.0]].view()).unwrap();
-    assert_eq!(npy::read_f32_narrowed(&path).unwrap(), array![[1.0, 2.0]]);
+    assert_eq!(npy::read_f32_rounded(&path).unwrap(), (array![[1.0, 2.0]], "float64"));
     npy::write_i64(&path, &[-1, 5]).unwrap();
     assert_eq!(npy::read_i64(&path).unwrap().to_vec(), [-1, 5]);
     let left: Vec<PathBuf> =
@@ -77,13 +77,72 @@ fn either_byte_order_and_memory_order_is_read() {
 }
 
 #[test]
+fn every_type_of_number_is_rounded_to_single_precision_and_named() {
+    let rounded = |descr: &str, body: &[u8]| {
+        let bytes = file(&header(descr, "False", "(1, 2)"), body);
+        read_bytes(&bytes, npy::read_f32_rounded).unwrap()
+    };
+    // 1.0 and -0.5 in half precision.
+    assert_eq!(rounded("<f2", &[0, 0x3c, 0, 0xb8]), (array![[1.0, -0.5]], "float16"));
+    let doubles: Vec<u8> = [0.1_f64, 2.0].iter().flat_map(|it| it.to_le_bytes()).collect();
+    assert_eq!(rounded("<f8", &doubles), (array![[0.1, 2.0]], "float64"));
+    assert_eq!(rounded("|u1", &[0, 255]), (array![[0.0, 255.0]], "uint8"));
+    assert_eq!(rounded(">i2", &[255, 255, 1, 0]), (array![[-1.0, 256.0]], "int16"));
+    let half = file(&header("<f2", "False", "(1, 1)"), &[0, 0x3c]);
+    assert_eq!(read_bytes(&half, npy::read_f32).unwrap(), array![[1.0]], "nothing is lost");
+    let bools = file(&header("|b1", "False", "(1, 1)"), &[1]);
+    let err = read_bytes(&bools, npy::read_f32_rounded).unwrap_err().to_string();
+    assert!(err.ends_with("holds bool, not numbers"), "{err}");
+}
+
+/// An archive with one array `names`.
+fn archive(descr: &str, shape: &[usize], body: &[u8]) -> (tempfile::TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.npz");
+    let mut archive = npy::npz::Writer::new(fs::File::create(&path).unwrap());
+    archive.add("names", descr, shape, body.iter().map(|&byte| [byte])).unwrap();
+    archive.finish().unwrap();
+    (folder, path)
+}
+
+#[test]
+fn texts_of_fixed_length_and_python_strings_are_read() {
+    let texts = |descr: &str, shape: &[usize], body: &[u8]| {
+        let (_folder, path) = archive(descr, shape, body);
+        let err =
+            |err: vpr_files::Error| err.to_string().split_once("`names`: ").unwrap().1.to_owned();
+        npy::npz::read_texts(&path, "names").map_err(err)
+    };
+    let utf_32 =
+        |text: &str| text.chars().flat_map(|it| u32::from(it).to_le_bytes()).collect::<Vec<u8>>();
+    assert_eq!(texts("<U2", &[2], &utf_32("äbc\0")).unwrap(), ["äb", "c"]);
+    assert_eq!(texts("|S2", &[2], b"abc\0").unwrap(), ["ab", "c"]);
+    assert!(texts("|S1", &[1], &[0xff]).unwrap_err().contains("only 0 are there and fit"));
+    assert!(texts("<U1", &[1, 1], &utf_32("a")).unwrap_err().contains("1 dimensions"));
+    assert_eq!(texts("<f4", &[1], &[0; 4]).unwrap_err(), "byte 0: holds float32, not text");
+    // Protocol 0: `numpy.ndarray` of shape (2,) with a list of two strings.
+    let pickle = |second: &str| {
+        format!(
+            "cnumpy.core.multiarray\n_reconstruct\n(cnumpy\nndarray\n(I0\ntS'b'\ntR(I1\n(I2\n\
+             tcnumpy\ndtype\n(S'O8'\nI0\nI1\ntR(I3\nS'|'\nNNNI-1\nI-1\nI63\ntbI00\n(lVa.jpg\n\
+             a{second}atb."
+        )
+    };
+    assert_eq!(texts("|O", &[2], pickle("Vb.jpg\n").as_bytes()).unwrap(), ["a.jpg", "b.jpg"]);
+    let err = texts("|O", &[2], pickle("I7\n").as_bytes()).unwrap_err();
+    assert_eq!(err, "row 1 is an int, not text");
+}
+
+#[test]
 fn another_type_or_number_of_dimensions_is_refused() {
     let f64s = file(&header("<f8", "False", "(1, 1)"), &[0; 8]);
     assert_eq!(refusal(&f64s), "byte 0: holds float64, not float32");
     let vector = file(&header("<f4", "False", "(1,)"), &[0; 4]);
     assert_eq!(refusal(&vector), "byte 0: has shape [1], but 2 dimensions are expected");
-    let half = file(&header("<f2", "False", "(1, 1)"), &[0; 2]);
-    assert!(refusal(&half).ends_with("in the header: dtype `<f2` is not read"));
+    let complex = file(&header("<c8", "False", "(1, 1)"), &[0; 8]);
+    assert!(refusal(&complex).ends_with("in the header: dtype `<c8` is not read"));
+    let brain = file(&header("|V2", "False", "(1, 1)"), &[0; 2]);
+    assert!(refusal(&brain).ends_with("if bfloat16, save it as float32"));
     let huge = file(&header("<u8", "False", "(1,)"), &[255; 8]);
     let err = read_bytes(&huge, npy::read_i64).unwrap_err().to_string();
     assert!(err.ends_with("of 1 elements, only 0 are there and fit"), "{err}");

@@ -38,7 +38,11 @@ fn resnet_of_bottlenecks_is_that_of_torchvision() {
 #[test]
 fn efficientnet_lite0_is_the_official_one_with_its_weights() {
     let Some(folder) = golden::folder("efficientnet_lite0") else { return };
-    let path = folder.join("../../data/weights/efficientnet_lite0.pth");
+    let Some(data) = std::env::var_os("VPR_DATA") else {
+        println!("skipped: VPR_DATA is not set, weights/ is in it");
+        return;
+    };
+    let path = Path::new(&data).join("weights/efficientnet_lite0.pth");
     let mut network = EfficientNetLite0Config::new().with_classes(Some(1000)).init(&Device::flex());
     weights::load(&mut network, &path, &efficientnet_lite::RENAMES).unwrap();
     for image in ["20", "500"] {

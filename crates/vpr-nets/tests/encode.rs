@@ -295,6 +295,34 @@ fn work_of_another_encoder_or_on_other_images_is_not_continued() {
 }
 
 #[test]
+fn a_replaced_image_is_refused_by_name_and_its_old_row_not_kept() {
+    let (folder, one) = folder(1);
+    let paths: Vec<_> = (0..300).map(|i| folder.path().join(format!("{i:03}.png"))).collect();
+    for path in &paths[1..] {
+        fs::copy(&one[0], path).unwrap();
+    }
+    let all = images(&paths);
+    let target = folder.path().join("map.safetensors");
+    let last = fs::read(&paths[299]).unwrap();
+    fs::write(&paths[299], b"not yet there").unwrap();
+    let options = Options { threads: Some(1), ..Options::default() };
+    let run = || encode_to_map(&fixed(), &all, &options, RowType::F32, &target, &mut |_| ());
+    assert!(run().unwrap_err().to_string().contains("299.png"));
+    // The last one was not described yet and may change; the seventh was.
+    fs::write(&paths[299], last).unwrap();
+    let seventh = fs::read(&paths[7]).unwrap();
+    png(&paths[7], 24, 12, 90);
+    let err = run().unwrap_err().to_string();
+    assert!(err.contains("007.png: image: has changed since an earlier run"), "{err}");
+    assert!(err.contains("map.safetensors.work to describe all images anew"), "{err}");
+    assert!(!target.exists());
+    fs::write(&paths[7], seventh).unwrap();
+    assert!(run().is_err(), "the same bytes at another time are not known to be the same");
+    fs::remove_dir_all(folder.path().join("map.safetensors.work")).unwrap();
+    assert_eq!(run().unwrap().n_resumed, 0);
+}
+
+#[test]
 fn descriptors_that_depend_on_their_batch_are_found() {
     let (_folder, paths) = folder(12);
     let options = Options { batch_size: 4, ..Options::default() };

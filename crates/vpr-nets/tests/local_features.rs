@@ -111,6 +111,11 @@ fn shared() -> Option<PathBuf> {
     data
 }
 
+/// The folder `golden` beside the data folder, also where that is a link.
+fn beside(data: &Path) -> PathBuf {
+    std::path::absolute(data).unwrap().with_file_name("golden")
+}
+
 /// The numbers that `uniform` of the script gives.
 fn uniform(key: &str, n: usize) -> impl Iterator<Item = f64> {
     let shift = key.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
@@ -208,7 +213,7 @@ fn superpoint_is_the_official_one() {
 #[test]
 fn xfeat_with_published_weights() {
     let Some(data) = shared() else { return };
-    let golden = Golden::open(&data.join("../golden/xfeat/io.safetensors"));
+    let golden = Golden::open(&beside(&data).join("xfeat/io.safetensors"));
     let network = XFeatNet::load(&data.join("weights/xfeat.pt"), &Device::flex()).unwrap();
     let params = XFeatParams { features: 512, ..XFeatParams::default() };
     let xfeat = XFeat::new(network, params, Device::flex());
@@ -230,7 +235,7 @@ fn xfeat_with_published_weights() {
 #[test]
 fn disk_with_published_weights() {
     let Some(data) = shared() else { return };
-    let golden = Golden::open(&data.join("../golden/disk/io.safetensors"));
+    let golden = Golden::open(&beside(&data).join("disk/io.safetensors"));
     let network =
         DiskNet::load(&data.join("weights/disk-depth-save.pth"), &Device::flex()).unwrap();
     let (descriptors, heatmap) = network.forward(golden.tensor("input.20"));
@@ -251,7 +256,7 @@ fn disk_with_published_weights() {
 #[test]
 fn superpoint_of_the_shared_golden_files() {
     let Some(data) = shared() else { return };
-    let path = data.join("../golden/superpoint");
+    let path = beside(&data).join("superpoint");
     let golden = Golden::open(&path.join("io.safetensors"));
     let network = SuperPointNet::load(&path.join("weights.safetensors"), &Device::flex()).unwrap();
     let params = SuperPointParams {

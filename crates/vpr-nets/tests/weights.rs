@@ -69,14 +69,18 @@ fn refusal(bytes: &[u8]) -> String {
     message
 }
 
+fn output(module: &Small) -> f32 {
+    let input = Tensor::<2>::from_data([[1.0, 1.0]], &Device::flex());
+    module.norm.forward(module.fc.forward(input)).into_scalar()
+}
+
 #[test]
 fn every_format_gives_the_same_network() {
     for (format, write) in formats() {
         let mut module = small();
         let report = load(&write(&entries()), &mut module).unwrap();
         assert_eq!((report.n_tensors, report.n_values), (6, 7), "{format}");
-        let input = Tensor::<2>::from_data([[1.0, 1.0]], &Device::flex());
-        let output = module.norm.forward(module.fc.forward(input)).into_scalar::<f32>();
+        let output = output(&module);
         // 2 + 3 + 1 = 6; (6 − 1) / √(4 + 1e-5) · 4 − 1
         assert!((output - 9.0).abs() < 1e-4, "{format}: {output}");
     }
@@ -100,6 +104,52 @@ fn strides_are_followed() {
 fn a_shared_prefix_of_data_parallel_training_is_removed() {
     let file = file(&zip_checkpoint(&[entry("module.a", &[1], &[1.0])]));
     assert!(weights::Weights::open(&file.path).unwrap().get("a").is_some());
+}
+
+/// The entries of the small network, all keys with something before them.
+fn behind(prefix: &str) -> Vec<Entry> {
+    let key = |entry: Entry| Entry { key: format!("{prefix}{}", entry.key).leak(), ..entry };
+    entries().into_iter().map(key).collect()
+}
+
+#[test]
+fn the_one_prefix_that_makes_all_keys_fit_is_left_out_and_said() {
+    assert_eq!(load(&zip_checkpoint(&entries()), &mut small()).unwrap().prefix, None);
+    for prefix in ["model.", "backbone.", "encoder.", "state_dict.", "net.encoder.", "fc."] {
+        for (format, write) in formats() {
+            let mut module = small();
+            let report = load(&write(&behind(prefix)), &mut module).unwrap();
+            assert_eq!(report.prefix.as_deref(), Some(prefix), "{format}");
+            assert!(report.to_string().contains(&format!("begin with `{prefix}`")), "{report}");
+            assert!((output(&module) - 9.0).abs() < 1e-4, "{format}");
+        }
+    }
+    let mut module = small();
+    let report = load(&zip_checkpoint(&behind("module.model.")), &mut module).unwrap();
+    assert_eq!(report.prefix.as_deref(), Some("model."));
+}
+
+#[test]
+fn where_no_prefix_helps_the_nearest_miss_is_named() {
+    let mut other = behind("model.");
+    other.remove(1);
+    let err = load(&zip_checkpoint(&other), &mut small()).unwrap_err();
+    let Error::Weights { mismatch, .. } = &err else { panic!("{err}") };
+    assert_eq!(
+        (mismatch.missing.as_slice(), mismatch.unexpected.len()),
+        (["fc.bias".to_owned()].as_slice(), 0)
+    );
+    // Not all keys begin with it: nothing is left out, and nothing dropped.
+    let mut mixed = behind("model.");
+    mixed.push(entry("loss.weight", &[1], &[0.0]));
+    assert!(matches!(load(&zip_checkpoint(&mixed), &mut small()), Err(Error::Weights { .. })));
+    let path = file(&zip_checkpoint(&behind("a.b.")));
+    let open = || weights::Weights::open(&path.path);
+    let twice = weights::fit(open, |it| {
+        if it.get("a.b.fc.bias").is_none() { Ok(()) } else { it.apply(&mut small()).map(drop) }
+    });
+    let err = twice.unwrap_err().to_string();
+    assert!(err.ends_with("keys: fit without `a.` and without `a.b.`"), "{err}");
 }
 
 #[test]

@@ -56,6 +56,53 @@ pub struct DataArgs {
     pub cache: PathBuf,
 }
 
+/// What `--data` and `--cache` are where nobody named a folder.
+const DATA: &str = "data";
+const CACHE: &str = "data/worlds";
+
+impl DataArgs {
+    /// The folders that are searched, the first that has something wins: the one that was named,
+    /// `data` where the program runs, and that of the checkout that the program was built in.
+    #[must_use]
+    pub fn folders(&self) -> Vec<PathBuf> {
+        self.folders_before(checkout_data())
+    }
+
+    /// The folder that keeps generated places: the one that was named, or, where the program runs
+    /// without a data folder, the one in the checkout that it was built in.
+    #[must_use]
+    pub fn cache(&self) -> PathBuf {
+        self.cache_before(checkout_data())
+    }
+
+    fn folders_before(&self, last: impl IntoIterator<Item = PathBuf>) -> Vec<PathBuf> {
+        let mut folders = vec![self.data.clone()];
+        for folder in std::iter::once(PathBuf::from(DATA)).chain(last) {
+            if !folders.contains(&folder) {
+                folders.push(folder);
+            }
+        }
+        folders
+    }
+
+    fn cache_before(&self, data: Option<PathBuf>) -> PathBuf {
+        match data {
+            Some(data) if self.cache == Path::new(CACHE) && !Path::new(DATA).is_dir() => {
+                data.join("worlds")
+            }
+            _ => self.cache.clone(),
+        }
+    }
+}
+
+/// `data/` of the checkout that this program was built in, if it still lies there.
+#[must_use]
+pub fn checkout_data() -> Option<PathBuf> {
+    let program = std::env::current_exe().and_then(|it| it.canonicalize()).ok()?;
+    let is_checkout = |it: &&Path| it.join("Cargo.lock").is_file() && it.join("data").is_dir();
+    program.ancestors().skip(1).find(is_checkout).map(|it| it.join("data"))
+}
+
 /// How results are printed and kept.
 #[derive(Args, Clone, Debug)]
 pub struct OutputArgs {
@@ -155,10 +202,28 @@ impl RunArgs {
             Ok(experiment)
         };
         let experiments = self.experiments.iter().map(open).collect::<anyhow::Result<_>>()?;
-        if !self.data.data.is_dir() {
-            bail!("{}: the data folder does not exist", self.data.data.display());
+        let data = &self.data.data;
+        // The usual name is looked for beside the experiment as well.
+        let is_beside = data == Path::new(DATA) && self.workspace_data().is_dir();
+        if !(data.is_dir() || is_beside) {
+            bail!("{}: the data folder does not exist", data.display());
         }
         Ok(experiments)
+    }
+
+    /// The folders that are searched: those of [`DataArgs::folders`], that beside the experiment
+    /// before the last.
+    #[must_use]
+    pub fn folders(&self) -> Vec<PathBuf> {
+        self.data.folders_before(std::iter::once(self.workspace_data()).chain(checkout_data()))
+    }
+
+    /// The folder that keeps generated places, see [`DataArgs::cache`]; beside the experiment
+    /// before that in the checkout.
+    #[must_use]
+    pub fn cache(&self) -> PathBuf {
+        let beside = Some(self.workspace_data()).filter(|it| it.is_dir());
+        self.data.cache_before(beside.or_else(checkout_data))
     }
 
     /// `data/` beside the folder of the first experiment file: where the fixture lies.
@@ -198,6 +263,36 @@ pub fn print(text: &str) -> anyhow::Result<()> {
     let mut stdout = std::io::stdout().lock();
     stdout.write_all(text.as_bytes())?;
     Ok(stdout.flush()?)
+}
+
+/// Refuses, before the work, a file that could not be written after it: something that is no file
+/// is called so, or the folder it should lie in is not there. A file that is there is replaced.
+///
+/// # Errors
+///
+/// Which of these it is, by the path.
+pub fn check_out(path: &Path) -> anyhow::Result<()> {
+    if path.is_dir() {
+        bail!("{}: is a folder, not a file to write", path.display());
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match folder.filter(|folder| !folder.is_dir()) {
+        Some(folder) => bail!("{}: {} is no folder", path.display(), folder.display()),
+        None => Ok(()),
+    }
+}
+
+/// A count that must not be zero, for `value_parser`.
+///
+/// # Errors
+///
+/// Why a text is none.
+pub fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(0) => Err("must be at least 1".to_owned()),
+        Ok(n) => Ok(n),
+        Err(err) => Err(err.to_string()),
+    }
 }
 
 /// Tells a person something, on stderr.

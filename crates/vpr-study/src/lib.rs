@@ -25,6 +25,8 @@ mod hand_crafted;
 mod memo;
 #[cfg(feature = "networks")]
 mod network;
+#[cfg(feature = "cli")]
+pub mod reading;
 mod scored;
 mod sheet;
 mod sources;
@@ -33,6 +35,8 @@ mod stored;
 mod subject;
 pub mod technique;
 mod thumbnail;
+#[cfg(feature = "cli")]
+mod truth;
 pub mod verification;
 
 pub use describe::{Describe, Features, Matched};
@@ -49,6 +53,8 @@ pub use stored::Stored;
 pub use subject::Subject;
 pub use technique::{Runner, Technique};
 pub use thumbnail::thumbnails;
+#[cfg(feature = "cli")]
+pub use truth::TruthArgs;
 
 /// The examples of the README, as tests.
 #[cfg(doctest)]

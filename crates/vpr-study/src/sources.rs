@@ -6,7 +6,9 @@ use std::{
 };
 
 use vpr_core::{Observer, Provenance, Result};
-use vpr_data::{DataRoots, Dataset, DatasetEntry, Datasets, layout::vpr_bench::GroundTruthFile};
+use vpr_data::{
+    AtHand, DataRoots, Dataset, DatasetEntry, Datasets, layout::vpr_bench::GroundTruthFile,
+};
 use vpr_worlds::Worlds;
 
 use crate::{
@@ -99,6 +101,15 @@ impl<'a> Sources<'a> {
     /// As [`DataRoots::locate`].
     pub fn locate(&self, path: &Path) -> Result<Option<PathBuf>> {
         self.roots().locate(path)
+    }
+
+    /// What of a dataset of the manifest is at hand.
+    ///
+    /// # Errors
+    ///
+    /// As [`Datasets::at_hand`].
+    pub fn at_hand(&self, entry: &DatasetEntry) -> Result<AtHand> {
+        self.datasets.at_hand(entry)
     }
 
     /// The published ground truth of a dataset, if at hand.

@@ -55,6 +55,7 @@ impl Sources<'_> {
             return Ok(None);
         };
         let matches = PublishedMatches::read(&path)?;
+        let truth = truth.about(matches.similarities.n_queries())?;
         let (truth, n_clamped) = truth.truth(matches.similarities.n_references())?;
         let timing = Timing { encoding: matches.encode_s, matching: matches.match_s };
         let best = BestMatches { reference: matches.reference, confidence: matches.score };

@@ -4,6 +4,7 @@
 //! the gray value and resizing are the ones OpenCV's `imread`, `cvtColor` and `resize` define, because the
 //! descriptors of the field were published through them.
 
+mod jpeg;
 mod resize;
 
 use std::{fs, io::Cursor, path::Path};
@@ -46,12 +47,13 @@ pub fn decode(path: &Path) -> Result<RgbImage> {
 /// # Errors
 ///
 /// [`Error::Format`] if it is neither JPEG nor PNG, if the header claims more than [`MAX_PIXELS`] or
-/// [`MAX_PIXELS_PER_BYTE`], or if the pixels are damaged or end early. A JPEG without its end marker counts as
-/// half-written and is refused, although its first rows could be shown.
+/// [`MAX_PIXELS_PER_BYTE`], or if the pixels are damaged or end early. A JPEG that is cut inside its coded data is
+/// refused, although its first rows could be shown; what follows its end (the film of a motion photo, a camera's own
+/// block, also where the end marker itself is missing) does not count.
 pub fn decode_bytes(bytes: &[u8], path: &Path) -> Result<RgbImage> {
     let mut decoder = decoder(bytes, path)?;
     let damaged = |reason: image::ImageError| Error::format(path, "pixels", reason.to_string());
-    if is_jpeg(bytes) && !is_complete_jpeg(bytes) {
+    if is_jpeg(bytes) && !jpeg::is_complete(bytes) {
         return Err(Error::format(path, "pixels", "the file ends before the image does"));
     }
     let orientation = decoder.orientation().map_err(damaged)?;
@@ -162,13 +164,6 @@ fn is_jpeg(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0xFF, 0xD8])
 }
 
-/// Whether an end marker follows the last start of a scan; neither occurs inside of coded pixels.
-fn is_complete_jpeg(bytes: &[u8]) -> bool {
-    let marker = |code: u8| move |pair: &[u8]| pair == [0xFF, code];
-    let last_scan = bytes.windows(2).rposition(marker(0xDA)).unwrap_or(0);
-    bytes[last_scan..].windows(2).any(marker(0xD9))
-}
-
 fn turns_sideways(orientation: image::metadata::Orientation) -> bool {
     use image::metadata::Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
     matches!(orientation, Rotate90 | Rotate90FlipH | Rotate270 | Rotate270FlipH)
@@ -236,6 +231,22 @@ mod tests {
                 assert!(error.starts_with("street.jpg: "), "{error}");
             }
         }
+    }
+
+    #[test]
+    fn trailers_change_no_pixel() {
+        let whole = encoded(ImageFormat::Jpeg);
+        let plain = decode_here(&whole).unwrap();
+        let film = b"\0\0\0\x18ftypmp42\x01\x02\x03\xFF\xDA\x09\x09\xFF\xD9";
+        let block = b"\0\0\x01\x0ASEFH\0\0\0\0\0\0";
+        let without_end = &whole[..whole.len() - 2];
+        for file in [[&whole, &film[..]], [&whole, &block[..]], [without_end, &block[..]]] {
+            let image = decode_here(&file.concat()).unwrap();
+            assert_eq!(image.as_slice(), plain.as_slice());
+        }
+        let cut = [&whole[..whole.len() / 2], &film[..]].concat();
+        let error = decode_here(&cut).err().unwrap().to_string();
+        assert_eq!(error, "street.jpg: pixels: the file ends before the image does");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! `bench evaluate` with a network.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use vpr_core::{Descriptors, Ranking};
 use vpr_nets::encode::{Encoder, Options, encode_files};
@@ -16,8 +16,8 @@ use super::{
 pub(super) struct Asked<'a> {
     pub(super) method: &'a str,
     pub(super) encoder: &'a EncoderArgs,
-    /// The data folder, where its weights may lie.
-    pub(super) data: &'a Path,
+    /// The data folders, where its weights may lie.
+    pub(super) data: &'a [PathBuf],
     pub(super) threads: Option<usize>,
 }
 

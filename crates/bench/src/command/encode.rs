@@ -4,13 +4,17 @@ use std::path::{Path, PathBuf};
 
 use vpr_core::map::RowType;
 use vpr_data::{
-    exchange::{self, Format, Parts},
-    layout::numbered::images_in_order,
+    exchange::{Format, Parts},
+    layout::{folder::Listing, numbered::images_in_order},
 };
 use vpr_nets::encode::{Images, encode_to_map};
 use vpr_report::cli::{self, DataArgs, Outcome};
+use vpr_study::reading::PoseArgs;
 
-use super::encoder::EncoderArgs;
+use super::{
+    encoder::EncoderArgs,
+    named::{names_in, say},
+};
 
 /// Describes the images of a folder and writes their map. Interrupted, it goes on where it stopped.
 #[derive(clap::Args)]
@@ -27,9 +31,8 @@ pub(crate) struct EncodeArgs {
     /// File or folder with the poses of the images, by their names
     #[arg(long, value_name = "PATH")]
     poses: Option<PathBuf>,
-    /// Its format, if its name does not say it
-    #[arg(long, value_name = "FORMAT", requires = "poses")]
-    poses_format: Option<Format>,
+    #[command(flatten)]
+    reading: PoseArgs,
     /// How descriptors are stored: f32, f16 or int8
     #[arg(long, value_name = "TYPE", default_value_t)]
     row_type: RowType,
@@ -45,8 +48,9 @@ pub(crate) struct EncodeArgs {
 }
 
 pub(crate) fn run(args: &EncodeArgs) -> anyhow::Result<Outcome> {
+    cli::check_out(&args.out)?;
     let images = images(args)?;
-    let encoder = args.encoder.open(&args.method, &args.data.data)?;
+    let encoder = args.encoder.open(&args.method, &args.data.folders())?;
     let options = args.encoder.options(args.threads, args.skip_bad);
     let bar = cli::progress(encoder.name(), images.paths.len());
     let written =
@@ -74,29 +78,30 @@ pub(crate) fn run(args: &EncodeArgs) -> anyhow::Result<Outcome> {
 /// The images of the folder in the order of their numbers, or else of their paths.
 fn images(args: &EncodeArgs) -> anyhow::Result<Images> {
     let folder = &args.images;
-    let paths = images_in_order(folder)?;
-    let name =
-        |path: &PathBuf| path.strip_prefix(folder).unwrap_or(path).to_string_lossy().into_owned();
-    let names: Vec<String> = paths.iter().map(name).collect();
-    let poses = match &args.poses {
-        Some(poses) => {
-            let format = args.poses_format.map_or_else(|| Format::guess(poses), Ok)?;
-            Some((exchange::read(format, poses)?, poses.as_path()))
+    let Listing { images: paths, notes } = images_in_order(folder)?;
+    say(&notes);
+    let names = names_in(folder, &paths);
+    let parts = Parts { names: Some(names.clone()), ..Parts::default() };
+    let n_utm = paths.iter().filter(|path| is_utm(path)).count();
+    let parts = match &args.poses {
+        Some(poses) => args.reading.join(parts, poses)?,
+        None if n_utm == paths.len() => {
+            let reading = PoseArgs { poses_format: Some(Format::UtmNames), ..args.reading };
+            reading.join(parts, folder)?
         }
-        None if is_utm(&paths) => {
-            Some((exchange::read(Format::UtmNames, folder)?, folder.as_path()))
+        None => {
+            if n_utm > 0 {
+                let n = paths.len();
+                let note = format!("only {n_utm} of {n} images have a position in their names");
+                say(&[format!("{}: {note}: the map gets none", folder.display())]);
+            }
+            parts
         }
-        None => None,
     };
-    let mut parts = Parts { names: Some(names.iter().collect()), ..Parts::default() };
-    if let Some((poses, place)) = poses {
-        parts = parts.join(poses).map_err(|err| err.in_file(place))?;
-    }
+    let names = names.iter().map(str::to_owned).collect();
     Ok(Images { paths, names, poses: parts.poses, coordinates: parts.about.coordinates })
 }
 
-fn is_utm(paths: &[PathBuf]) -> bool {
-    let name =
-        |path: &Path| path.file_name().is_some_and(|it| it.to_string_lossy().starts_with('@'));
-    paths.iter().all(|path| name(path))
+fn is_utm(path: &Path) -> bool {
+    path.file_name().is_some_and(|it| it.to_string_lossy().starts_with('@'))
 }

@@ -1,6 +1,6 @@
 //! The flags that choose an encoder, as VPR-methods-evaluation names them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::bail;
 use vpr_nets::encode::{Encoder, Options, Request, Size, by_request, registry::Method};
@@ -14,7 +14,9 @@ pub(crate) struct EncoderArgs {
     /// Backbone, where a method has several
     #[arg(long, value_name = "NAME")]
     pub(super) backbone: Option<String>,
-    /// Length of the descriptors, where a method has several
+    /// Length of the descriptors, where a method has several; by default that of
+    /// VPR-methods-evaluation: cosplace and eigenplaces 2048 (512 on ResNet-18 and VGG16), mixvpr
+    /// and netvlad 4096
     #[arg(long, alias = "descriptors_dimension", value_name = "N")]
     pub(super) descriptors_dimension: Option<usize>,
     /// Size of the images: height and width, or the shorter side; by default the method's own
@@ -30,7 +32,7 @@ pub(crate) struct EncoderArgs {
 
 impl EncoderArgs {
     /// The encoder with its weights.
-    pub(super) fn open(&self, method: &str, data: &Path) -> anyhow::Result<Box<dyn Encoder>> {
+    pub(super) fn open(&self, method: &str, data: &[PathBuf]) -> anyhow::Result<Box<dyn Encoder>> {
         let size = match self.image_size[..] {
             [] => None,
             [side] => Some(Size::ShorterSide(side)),
@@ -43,9 +45,21 @@ impl EncoderArgs {
             dimension: self.descriptors_dimension,
             weights: self.weights.clone(),
             size,
-            roots: vec![data.to_owned(), PathBuf::from("data")],
+            roots: data.to_vec(),
         })?;
-        let official = Method::find(method, self.backbone.as_deref())?.digest;
+        if let Some(prefix) = encoder.weights_prefix() {
+            vpr_report::cli::note(&format!(
+                "note: the keys of the weights begin with `{prefix}`, which is left out"
+            ));
+        }
+        let registered = Method::find(method, self.backbone.as_deref())?;
+        let (usual, actual) = (registered.dimensions[0], encoder.dimension());
+        if self.descriptors_dimension.is_none() && actual != usual {
+            vpr_report::cli::note(&format!(
+                "note: the weights give descriptors of {actual} values, not of {usual}"
+            ));
+        }
+        let official = registered.digest;
         if let (Some(official), Some(actual)) = (official, encoder.weights_digest())
             && official != actual
         {

@@ -1,16 +1,12 @@
-//! `bench evaluate`: from two folders or two descriptor files to `R@1: 98.8, R@5: 99.7, …`.
+//! `bench evaluate`: from two folders, two descriptor files or a matrix of scores to
+//! `R@1: 98.8, R@5: 99.7, …`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context, bail, ensure};
-use vpr_core::{
-    Descriptors, GroundTruth, Observer as _, Ranking,
-    metrics::{Positives, auc_pr, recall_at},
-};
-use vpr_data::layout::vpr_bench::GroundTruthFile;
-use vpr_files::npy;
+use anyhow::ensure;
+use vpr_core::{GroundTruth, Observer as _, Provenance};
 use vpr_report::cli::{self, Bar, DataArgs, Outcome, ReportArgs};
-use vpr_study::{Runner, Sources, technique::hand_crafted};
+use vpr_study::{Runner, TruthArgs, reading::ReadingArgs, technique::hand_crafted};
 
 #[cfg(feature = "networks")]
 use super::{
@@ -18,10 +14,12 @@ use super::{
     encoder::EncoderArgs,
 };
 use super::{
+    input::Input,
     named::Named,
-    predictions::{self, Saving},
+    predictions::{Place, Saving},
     report,
-    retrieved::{Retrieved, nearest},
+    result::{self, OutputFormat},
+    retrieved::Retrieved,
 };
 
 /// The flags of VPR-methods-evaluation, in kebab case; the names with underscores work too.
@@ -29,18 +27,20 @@ use super::{
 #[expect(clippy::struct_excessive_bools, reason = "one per flag")]
 pub(crate) struct EvaluateArgs {
     /// A dataset by name, such as `corridor` or the generated `world/street`, with its own truth
+    /// unless another is given
     #[arg(
         long,
         value_name = "NAME",
-        conflicts_with_all = ["database_folder", "database_descriptors", "ground_truth"]
+        conflicts_with_all = ["database_folder", "database_descriptors", "similarities", "distances"]
     )]
     pub(super) dataset: Option<String>,
-    /// Folder of the reference images, with `@utm_east@utm_north@…` names
+    /// Folder of the reference images; their positions are those of --database-poses, or of
+    /// `@utm_east@utm_north@…` names; none are needed with another truth or --no-labels
     #[arg(long, alias = "database_folder", value_name = "DIR", requires = "queries_folder")]
-    database_folder: Option<PathBuf>,
+    pub(super) database_folder: Option<PathBuf>,
     /// Folder of the query images
     #[arg(long, alias = "queries_folder", value_name = "DIR", requires = "database_folder")]
-    queries_folder: Option<PathBuf>,
+    pub(super) queries_folder: Option<PathBuf>,
     /// Technique that describes the images: hog, hog-thesis, cohog, or a network of `bench methods`
     #[arg(long, default_value = "hog", value_name = "NAME")]
     pub(super) method: String,
@@ -48,36 +48,48 @@ pub(crate) struct EvaluateArgs {
     #[command(flatten)]
     encoder: EncoderArgs,
     #[command(flatten)]
-    data: DataArgs,
-    /// Descriptors of the references, one row each: .npy, float32
+    pub(super) data: DataArgs,
+    /// Leave out images that cannot be decoded, and list them, instead of stopping at the first
+    #[arg(long, alias = "skip_bad")]
+    skip_bad: bool,
+    /// Descriptors of the references, one row each: .npy, or any format of docs/formats.md
     #[arg(
         long,
         alias = "database_descriptors",
-        value_name = "NPY",
+        value_name = "FILE",
         requires = "queries_descriptors",
-        conflicts_with = "database_folder"
+        conflicts_with_all = ["database_folder", "similarities", "distances"]
     )]
     pub(super) database_descriptors: Option<PathBuf>,
     /// Descriptors of the queries
     #[arg(
         long,
         alias = "queries_descriptors",
-        value_name = "NPY",
+        value_name = "FILE",
         requires = "database_descriptors"
     )]
-    queries_descriptors: Option<PathBuf>,
-    /// Poses of the references: CSV with a header
-    #[arg(long, alias = "database_poses", value_name = "CSV", requires = "queries_poses")]
-    database_poses: Option<PathBuf>,
+    pub(super) queries_descriptors: Option<PathBuf>,
+    /// How similar every query is to every reference, a row per query, instead of images: .npy, an
+    /// .npz of one array, text, or VPR-Bench's stored matches; higher is more similar
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["database_folder", "distances"])]
+    pub(super) similarities: Option<PathBuf>,
+    /// The same as distances; lower is nearer
+    #[arg(long, value_name = "FILE", conflicts_with = "database_folder")]
+    pub(super) distances: Option<PathBuf>,
+    /// The rows of the scores are the references, as the tutorial of VPR has them
+    #[arg(long)]
+    pub(super) scores_transposed: bool,
+    /// Poses of the references: a table, or any format of docs/formats.md; by name if both files
+    /// have names, by order otherwise
+    #[arg(long, alias = "database_poses", value_name = "FILE", requires = "queries_poses")]
+    pub(super) database_poses: Option<PathBuf>,
     /// Poses of the queries
-    #[arg(long, alias = "queries_poses", value_name = "CSV", requires = "database_poses")]
-    queries_poses: Option<PathBuf>,
-    /// Correct references per query, VPR-Bench's `ground_truth_new.npy`; instead of positions
-    #[arg(long, alias = "ground_truth", value_name = "NPY", conflicts_with = "database_poses")]
-    pub(super) ground_truth: Option<PathBuf>,
-    /// A reference is correct within this many metres, the limit included
-    #[arg(long, alias = "positive_dist_threshold", default_value_t = 25.0, value_name = "M")]
-    pub(super) positive_dist_threshold: f64,
+    #[arg(long, alias = "queries_poses", value_name = "FILE", requires = "database_poses")]
+    pub(super) queries_poses: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) reading: ReadingArgs,
+    #[command(flatten)]
+    pub(super) truth: TruthArgs,
     /// Which N of recall@N to print
     #[arg(long, alias = "recall_values", num_args = 1.., default_values_t = [1, 5, 10, 20], value_name = "N")]
     recall_values: Vec<usize>,
@@ -85,8 +97,15 @@ pub(crate) struct EvaluateArgs {
     #[arg(long, alias = "auc_pr", conflicts_with = "no_labels")]
     auc_pr: bool,
     /// Only retrieve; positions are unknown
-    #[arg(long, alias = "no_labels")]
-    no_labels: bool,
+    #[arg(
+        long,
+        alias = "no_labels",
+        conflicts_with_all = ["ground_truth", "labels", "same_index"]
+    )]
+    pub(super) no_labels: bool,
+    /// How the numbers are printed
+    #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
+    format: OutputFormat,
     /// How many predictions to save for each query
     #[arg(long, alias = "num_preds_to_save", default_value_t = 0, value_name = "N")]
     num_preds_to_save: usize,
@@ -113,31 +132,69 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     ensure!(args.recall_values.iter().all(|&n| n > 0), "`recall-values` 0: recall@0 is no metric");
     let largest = args.recall_values.iter().copied().max().unwrap_or(1);
     let k = largest.max(args.num_preds_to_save);
-    let retrieved = match (&args.dataset, &args.database_folder, &args.queries_folder) {
-        (Some(id), _, _) => from_dataset(args, id, k)?,
-        (_, Some(references), Some(queries)) => from_folders(args, queries, references, k)?,
-        _ => from_descriptors(args, k)?,
+    // What can be wrong is found before the work: the truth, and where results are saved.
+    let input = Input::open(args)?;
+    let source = args.truth.source();
+    let truth = if args.no_labels {
+        None
+    } else {
+        Some(input.truth(source.as_ref(), args.truth.positive_dist_threshold)?)
     };
-    let truth = match &retrieved.truth {
-        _ if args.no_labels => None,
-        Some(truth) => Some(truth.clone()),
-        None => Some(truth(args, &retrieved)?),
-    };
+    let place = Place::create(&args.saving())?;
+    let (input, truth) = if args.skip_bad { input.without_bad(truth)? } else { (input, truth) };
+    let provenance = input.provenance;
+    let retrieved = input.retrieve(args, k)?;
+    let mut files = Vec::new();
     if let Some(truth) = &truth {
-        cli::print(&format!("{}\n", recalls(args, &retrieved.ranking, truth)?))?;
-        if let Some(alone) = &retrieved.alone {
-            cli::print(&format!("{} (images one by one)\n", recalls(args, alone, truth)?))?;
-        }
-        if args.auc_pr {
-            print_auc_pr(&retrieved, truth)?;
+        print(args, provenance, &retrieved, truth)?;
+        if place.is_some() {
+            let format = result::format_of(OutputFormat::Csv);
+            let (values, auc_pr) = (&args.recall_values, args.auc_pr);
+            let table = result::table(values, auc_pr, format, provenance, &retrieved, truth)?;
+            files.push(("metrics.csv", table.render(format)));
         }
     }
-    predictions::save(&args.saving(), &retrieved, truth.as_ref())?;
     report::write(args, &retrieved, truth.as_ref())?;
+    if let Some(place) = place {
+        place.save(&args.saving(), &retrieved, truth.as_ref(), &files)?;
+    }
     Ok(Outcome::Success)
 }
 
+/// Prints the numbers: stdout has what other programs read, the line goes to stderr then.
+fn print(
+    args: &EvaluateArgs,
+    provenance: Provenance,
+    retrieved: &Retrieved,
+    truth: &GroundTruth,
+) -> anyhow::Result<()> {
+    let mut text = result::line(&args.recall_values, &retrieved.ranking, truth)? + "\n";
+    if let Some(alone) = &retrieved.alone {
+        let line = result::line(&args.recall_values, alone, truth)?;
+        text += &(line + " (images one by one)\n");
+    }
+    if args.auc_pr {
+        text += &(result::auc_pr_line(retrieved, truth)? + "\n");
+    }
+    match args.format {
+        OutputFormat::Line | OutputFormat::Table => cli::print(&text)?,
+        OutputFormat::Csv | OutputFormat::Json => cli::note(text.trim_end()),
+    }
+    if args.format != OutputFormat::Line {
+        let format = result::format_of(args.format);
+        let (values, auc_pr) = (&args.recall_values, args.auc_pr);
+        let table = result::table(values, auc_pr, format, provenance, retrieved, truth)?;
+        cli::print(&table.render(format))?;
+    }
+    Ok(())
+}
+
 impl EvaluateArgs {
+    /// Whether what is correct follows from positions.
+    pub(super) fn needs_positions(&self) -> bool {
+        !self.no_labels && self.truth.source().is_none()
+    }
+
     /// What is saved, and where.
     fn saving(&self) -> Saving<'_> {
         Saving {
@@ -147,153 +204,42 @@ impl EvaluateArgs {
             log_dir: &self.log_dir,
         }
     }
-}
 
-/// `R@1: 98.8, R@5: 99.7, …`
-fn recalls(args: &EvaluateArgs, ranking: &Ranking, truth: &GroundTruth) -> anyhow::Result<String> {
-    let entries = args.recall_values.iter().map(|&n| {
-        let recall = recall_at(n, ranking, truth)?;
-        Ok(format!("R@{n}: {:.1}", 100.0 * recall))
-    });
-    Ok(entries.collect::<vpr_core::Result<Vec<String>>>()?.join(", "))
-}
-
-/// Prints AUC-PR in both definitions.
-fn print_auc_pr(retrieved: &Retrieved, truth: &GroundTruth) -> anyhow::Result<()> {
-    let ranking = &retrieved.ranking;
-    let best: Vec<_> = (0..ranking.len()).map(|query| ranking.indices(query)[0]).collect();
-    let correct = truth.judge(&best)?;
-    let area = |positives| auc_pr(&retrieved.confidence, &correct, positives);
-    let (published, corrected) = (area(Positives::Published)?, area(Positives::corrected(truth))?);
-    cli::print(&format!("AUC-PR: {published:.3} (published), {corrected:.3} (corrected)\n"))?;
-    Ok(())
-}
-
-/// Describes and matches the images of two folders.
-fn from_folders(
-    args: &EvaluateArgs,
-    queries: &Path,
-    references: &Path,
-    k: usize,
-) -> anyhow::Result<Retrieved> {
-    let needs_positions = !args.no_labels && args.ground_truth.is_none();
-    let queries = Named::folder(queries, needs_positions)?;
-    let references = Named::folder(references, needs_positions)?;
-    match_images(args, queries, references, k)
-}
-
-/// Describes and matches the images of a dataset.
-fn from_dataset(args: &EvaluateArgs, id: &str, k: usize) -> anyhow::Result<Retrieved> {
-    let bar = Bar::default();
-    let sources = Sources::new([&*args.data.data, Path::new("data")], &args.data.cache, &bar);
-    let Some(dataset) = sources.images(id)? else { bail!(sources.why_absent(id, "images")?) };
-    let (query_poses, reference_poses) = dataset.poses.clone().unzip();
-    let named =
-        |names: &[PathBuf], poses| Named { names: names.to_vec(), poses, zone: String::new() };
-    let queries = named(&dataset.queries, query_poses);
-    let references = named(&dataset.references, reference_poses);
-    let retrieved = match_images(args, queries, references, k)?;
-    Ok(Retrieved { truth: Some(dataset.truth.clone()), ..retrieved })
-}
-
-/// Describes and matches two sets of images by the method asked for.
-fn match_images(
-    args: &EvaluateArgs,
-    queries: Named,
-    references: Named,
-    k: usize,
-) -> anyhow::Result<Retrieved> {
-    let Some(Runner { technique, .. }) = hand_crafted(&args.method) else {
-        #[cfg(feature = "networks")]
-        {
-            let asked = Asked {
-                method: &args.method,
-                encoder: &args.encoder,
-                data: &args.data.data,
-                threads: args.num_workers,
-            };
-            return by_network::retrieve(&asked, queries, references, k);
-        }
-        #[cfg(not(feature = "networks"))]
-        bail!(
-            "`{}` is no technique without a network, and this program was built without networks: \
-             add `--features vpr-bench/networks` to cargo's flags",
-            args.method
-        );
-    };
-    let bar = Bar::default();
-    let n = queries.names.len() + references.names.len();
-    bar.start("images", n);
-    let step = || bar.step();
-    let query_features = technique.encode(&queries.names, &step)?;
-    let reference_features = technique.encode(&references.names, &step)?;
-    bar.end();
-    let matched = query_features.match_with(&reference_features)?;
-    let ranking = matched.similarities.ranked(k)?;
-    let descriptors = query_features.into_descriptors().zip(reference_features.into_descriptors());
-    let similarities = matched.similarities;
-    let confidence = similarities.best().confidence;
-    let scores = similarities.view();
-    let of = |query: usize| ranking.indices(query).iter().map(|&it| -scores[[query, it]]).collect();
-    let distances = (0..ranking.len()).map(of).collect();
-    let retrieved = Retrieved::new([queries, references], ranking, confidence, descriptors);
-    Ok(Retrieved { distances, similarities: Some(similarities), ..retrieved })
-}
-
-/// Retrieves from two files of descriptors by Euclidean distance.
-fn from_descriptors(args: &EvaluateArgs, k: usize) -> anyhow::Result<Retrieved> {
-    let (Some(references), Some(queries)) = (&args.database_descriptors, &args.queries_descriptors)
-    else {
-        bail!(
-            "give --dataset, --database-folder and --queries-folder, or --database-descriptors and --queries-descriptors"
-        );
-    };
-    let read = |path: &PathBuf| -> anyhow::Result<Descriptors> {
-        Descriptors::new(npy::read_f32(path)?).with_context(|| path.display().to_string())
-    };
-    let (query_rows, reference_rows) = (read(queries)?, read(references)?);
-    let named = |poses: &Option<PathBuf>, rows: &Descriptors| match poses {
-        Some(path) => Named::poses(path, rows.len()),
-        None => Ok(Named::numbered(rows.len())),
-    };
-    let (named_queries, named_references) =
-        (named(&args.queries_poses, &query_rows)?, named(&args.database_poses, &reference_rows)?);
-    nearest(named_queries, named_references, query_rows, reference_rows, k)
-        .with_context(|| format!("{} and {}", queries.display(), references.display()))
-}
-
-/// Which references are correct: from a file, or by distance.
-fn truth(args: &EvaluateArgs, retrieved: &Retrieved) -> anyhow::Result<GroundTruth> {
-    let (queries, references) = (&retrieved.queries, &retrieved.references);
-    if let Some(path) = &args.ground_truth {
-        let file = GroundTruthFile::read(path)?;
-        ensure!(
-            file.len() == queries.names.len(),
-            "{}: {} rows for {} queries",
-            path.display(),
-            file.len(),
-            queries.names.len()
-        );
-        let (truth, n_clamped) = file.truth(references.names.len())?;
-        if n_clamped > 0 {
-            cli::note(&format!(
-                "warning: {}: {n_clamped} entries point past the {} references and are dropped",
-                path.display(),
-                references.names.len()
-            ));
-        }
-        return Ok(truth);
+    /// Describes and matches two sets of images by the method asked for.
+    pub(super) fn match_images(
+        &self,
+        queries: Named,
+        references: Named,
+        k: usize,
+    ) -> anyhow::Result<Retrieved> {
+        let Some(Runner { technique, .. }) = hand_crafted(&self.method) else {
+            #[cfg(feature = "networks")]
+            {
+                let folders = self.data.folders();
+                let asked = Asked {
+                    method: &self.method,
+                    encoder: &self.encoder,
+                    data: &folders,
+                    threads: self.num_workers,
+                };
+                return by_network::retrieve(&asked, queries, references, k);
+            }
+            #[cfg(not(feature = "networks"))]
+            anyhow::bail!(
+                "`{}` is no technique without a network, and this program was built without \
+                 networks: add `--features vpr-bench/networks` to cargo's flags",
+                self.method
+            );
+        };
+        let bar = Bar::default();
+        bar.start("images", queries.len() + references.len());
+        let step = || bar.step();
+        let query_features = technique.encode(&queries.names, &step)?;
+        let reference_features = technique.encode(&references.names, &step)?;
+        bar.end();
+        let matched = query_features.match_with(&reference_features)?;
+        let descriptors =
+            query_features.into_descriptors().zip(reference_features.into_descriptors());
+        Ok(Retrieved { descriptors, ..Retrieved::of_scores([queries, references], matched.similarities, k)? })
     }
-    let (Some(query_poses), Some(reference_poses)) = (&queries.poses, &references.poses) else {
-        bail!(
-            "no positions: give --database-poses and --queries-poses, --ground-truth, or --no-labels"
-        );
-    };
-    ensure!(
-        queries.zone == references.zone,
-        "queries are in UTM zone {}, references in {}: their coordinates cannot be compared",
-        queries.zone,
-        references.zone
-    );
-    Ok(GroundTruth::within_radius(query_poses, reference_poses, args.positive_dist_threshold)?)
 }

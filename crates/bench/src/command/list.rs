@@ -1,6 +1,6 @@
 //! `bench list`: techniques, datasets, metrics.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use clap::ValueEnum;
 use vpr_core::metrics::catalogue::CATALOGUE;
@@ -21,7 +21,7 @@ pub(crate) struct ListArgs {
 enum What {
     /// Techniques, and whether they run here
     Techniques,
-    /// Datasets, and whether they are at hand
+    /// Datasets, and what of them is at hand: images, what is correct, stored scores
     Datasets,
     /// Metrics, and the functions that compute them
     Metrics,
@@ -31,7 +31,8 @@ pub(crate) fn run(args: &ListArgs) -> anyhow::Result<Outcome> {
     let lines = match args.what {
         What::Techniques => techniques(),
         What::Datasets => {
-            datasets(&Sources::new([&*args.data.data, Path::new("data")], &args.data.cache, &()))?
+            let (folders, cache) = (args.data.folders(), args.data.cache());
+            datasets(&Sources::new(folders.iter().map(PathBuf::as_path), &cache, &()))?
         }
         What::Metrics => metrics(),
     };
@@ -50,24 +51,31 @@ fn techniques() -> Vec<String> {
     Technique::ALL.into_iter().map(line).collect()
 }
 
+/// One line each: what of it is at hand, how large it is.
 fn datasets(data: &Sources<'_>) -> vpr_core::Result<Vec<String>> {
+    let worlds: Vec<String> =
+        vpr_worlds::names().into_iter().map(|world| format!("world/{world}")).collect();
+    let ids = data.entries().map(|entry| &entry.id).chain(&worlds);
+    let width = ids.map(String::len).max().unwrap_or_default();
     let mut lines = Vec::new();
     for entry in data.entries() {
-        let at_hand = if data.locate(&entry.path)?.is_some() { "at hand" } else { "absent" };
+        let at_hand = data.at_hand(entry)?;
+        let said = |is_there: bool, what: &'static str| if is_there { what } else { "-" };
         let count = |n: Option<usize>| n.map_or_else(|| "-".to_owned(), |n| n.to_string());
         lines.push(format!(
-            "{:<22}{:<9}{:>6} queries {:>6} references  {}",
+            "{:<width$}  {:<6} {:<5} {:<6} {:>6} queries {:>6} references  {}",
             entry.id,
-            at_hand,
+            said(at_hand.images, "images"),
+            said(at_hand.truth, "truth"),
+            said(at_hand.scores, "scores"),
             count(entry.queries),
             count(entry.references),
             entry.name,
         ));
     }
-    for world in vpr_worlds::names() {
-        let id = format!("world/{world}");
-        let origin = data.entry(&id).map_or_else(|err| err.to_string(), |entry| entry.origin);
-        lines.push(format!("{id:<34}{origin}"));
+    for id in &worlds {
+        let origin = data.entry(id).map_or_else(|err| err.to_string(), |entry| entry.origin);
+        lines.push(format!("{id:<width$}  {origin}"));
     }
     Ok(lines)
 }

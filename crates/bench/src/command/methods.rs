@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use vpr_nets::encode::{
     Interpolation, Size,
-    registry::{Method, methods},
+    registry::{Architecture, Method, methods},
 };
 use vpr_report::cli::{self, DataArgs, Outcome};
 
@@ -18,7 +18,7 @@ pub(crate) struct MethodsArgs {
 }
 
 pub(crate) fn run(args: &MethodsArgs) -> anyhow::Result<Outcome> {
-    let roots = [args.data.data.clone(), PathBuf::from("data")];
+    let roots = args.data.folders();
     let text = match &args.name {
         Some(name) => everything(&Method::find(name, None)?, &roots),
         None => methods().iter().map(|method| line(method, &roots)).collect(),
@@ -30,9 +30,18 @@ pub(crate) fn run(args: &MethodsArgs) -> anyhow::Result<Outcome> {
 fn line(method: &Method, roots: &[PathBuf]) -> String {
     let dimension = method.dimensions[0];
     let at_hand = method.dimensions.iter().any(|&it| method.locate(it, roots).is_some());
-    let state = if at_hand { "at hand" } else { "absent" };
+    let state = match at_hand {
+        _ if is_built_in(method) => "built in",
+        true => "at hand",
+        false => "absent",
+    };
     let (name, backbone) = (&method.name, &method.backbone);
     format!("{name:<26}{backbone:<20}{dimension:>6}  {state:<9}{}\n", method.paper)
+}
+
+/// Whether its weights are part of the program, wherever else they lie.
+fn is_built_in(method: &Method) -> bool {
+    method.architecture == Architecture::Default
 }
 
 fn everything(method: &Method, roots: &[PathBuf]) -> String {
@@ -40,6 +49,11 @@ fn everything(method: &Method, roots: &[PathBuf]) -> String {
     let dimension = method.dimensions[0];
     let place =
         method.locate(dimension, roots).map_or("absent".to_owned(), |place| place.to_string());
+    let place = match &*place {
+        "built in" => place,
+        file if is_built_in(method) => format!("built in, and {file}, which is used"),
+        _ => place,
+    };
     let preprocessing = method.preprocessing();
     let size = match preprocessing.size {
         Size::Fixed { height, width } => format!("height {height}, width {width}"),

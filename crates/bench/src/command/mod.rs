@@ -7,6 +7,7 @@ pub(crate) mod encode;
 #[cfg(feature = "networks")]
 mod encoder;
 pub(crate) mod evaluate;
+mod input;
 pub(crate) mod list;
 mod log_folder;
 pub(crate) mod map;
@@ -16,6 +17,7 @@ pub(crate) mod methods;
 mod named;
 pub(crate) mod predictions;
 mod report;
+mod result;
 mod retrieved;
 pub(crate) mod run;
 pub(crate) mod validate;

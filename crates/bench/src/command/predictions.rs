@@ -1,6 +1,10 @@
 //! What `bench evaluate` saves, laid out as VPR-methods-evaluation does.
 
-use std::{fmt::Write as _, fs, path::Path};
+use std::{
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use anyhow::Context;
 use vpr_core::GroundTruth;
@@ -22,40 +26,67 @@ pub(super) struct Saving<'a> {
     pub(super) log_dir: &'a str,
 }
 
-/// Saves predictions and descriptors below `logs/<log_dir>/<time>/`, if any are asked for.
-pub(super) fn save(
-    saving: &Saving<'_>,
-    retrieved: &Retrieved,
-    truth: Option<&GroundTruth>,
-) -> anyhow::Result<()> {
-    if saving.n_predictions == 0 && !saving.descriptors {
-        return Ok(());
-    }
-    let folder = log_folder::create(&Path::new("logs").join(saving.log_dir))?;
-    if saving.descriptors {
-        let (queries, references) = retrieved
-            .descriptors
-            .as_ref()
-            .context("`save-descriptors`: this method does not have one vector per image")?;
-        npy::write_f32(&folder.join("queries_descriptors.npy"), queries.view())?;
-        npy::write_f32(&folder.join("database_descriptors.npy"), references.view())?;
-    }
-    if saving.n_predictions > 0 {
-        let preds = folder.join("preds");
-        fs::create_dir_all(&preds).with_context(|| preds.display().to_string())?;
-        for query in 0..retrieved.queries.names.len() {
-            let best = retrieved.ranking.indices(query)[0];
-            let is_correct = truth.is_some_and(|truth| truth.is_correct(query, best));
-            if saving.only_wrong && is_correct {
-                continue;
-            }
-            let path = preds.join(format!("{query:03}.txt"));
-            let text = prediction(retrieved, truth, query, saving.n_predictions);
-            vpr_files::replace(&path, text.as_bytes())?;
+/// The folder of a run's results, made before the work: what cannot be saved there is known then.
+pub(super) struct Place(PathBuf);
+
+impl Place {
+    /// Makes `logs/<log_dir>/<time>/`, if anything is to be saved.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be made, as where a file is called so.
+    pub(super) fn create(saving: &Saving<'_>) -> anyhow::Result<Option<Self>> {
+        if saving.n_predictions == 0 && !saving.descriptors {
+            return Ok(None);
         }
+        let folder = log_folder::create(&Path::new("logs").join(saving.log_dir))?;
+        Ok(Some(Self(folder)))
     }
-    cli::note(&format!("saved in {}", folder.display()));
-    Ok(())
+
+    /// Saves predictions, descriptors and these texts.
+    pub(super) fn save(
+        self,
+        saving: &Saving<'_>,
+        retrieved: &Retrieved,
+        truth: Option<&GroundTruth>,
+        files: &[(&str, String)],
+    ) -> anyhow::Result<()> {
+        let folder = &self.0;
+        for (name, text) in files {
+            vpr_files::replace(&folder.join(name), text.as_bytes())?;
+        }
+        if saving.descriptors {
+            let (queries, references) = retrieved
+                .descriptors
+                .as_ref()
+                .context("`save-descriptors`: there is not one vector per image")?;
+            npy::write_f32(&folder.join("queries_descriptors.npy"), queries.view())?;
+            npy::write_f32(&folder.join("database_descriptors.npy"), references.view())?;
+        }
+        if saving.n_predictions > 0 {
+            let preds = folder.join("preds");
+            fs::create_dir_all(&preds).with_context(|| preds.display().to_string())?;
+            for query in 0..retrieved.queries.names.len() {
+                let best = retrieved.ranking.indices(query)[0];
+                let is_correct = truth.is_some_and(|truth| truth.is_correct(query, best));
+                if saving.only_wrong && is_correct {
+                    continue;
+                }
+                let path = preds.join(format!("{query:03}.txt"));
+                let text = prediction(retrieved, truth, query, saving.n_predictions);
+                vpr_files::replace(&path, text.as_bytes())?;
+            }
+        }
+        cli::note(&format!("saved in {}", folder.display()));
+        Ok(())
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        // A run that failed leaves no empty folder; one with results is not empty and stays.
+        let _ = fs::remove_dir(&self.0);
+    }
 }
 
 /// One query with its predictions and, if known, its correct references.

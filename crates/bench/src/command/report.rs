@@ -25,8 +25,9 @@ pub(super) fn write(
     }
     let (queries, references) = (&retrieved.queries, &retrieved.references);
     let pictures = thumbnails(&queries.names, &references.names);
-    // Rows of a file of descriptors have no pictures.
-    let has_pictures = args.database_descriptors.is_none();
+    // Rows of a file of descriptors or scores have no pictures.
+    let has_scores = args.similarities.is_some() || args.distances.is_some();
+    let has_pictures = args.database_descriptors.is_none() && !has_scores;
     let names = |names: &[PathBuf]| names.iter().map(|it| it.display().to_string()).collect();
     let name = args.dataset.clone().unwrap_or_else(|| "images".to_owned());
     let is_small = |it: &&Similarities| it.n_queries() * it.n_references() <= MATRIX;
@@ -45,7 +46,11 @@ pub(super) fn write(
     };
     let is_similarity = retrieved.similarities.is_some();
     let run = Run {
-        name: if has_pictures { args.method.clone() } else { "descriptors".to_owned() },
+        name: match (has_pictures, has_scores) {
+            (true, _) => args.method.clone(),
+            (_, true) => "scores".to_owned(),
+            _ => "descriptors".to_owned(),
+        },
         matches: retrieved.distances.iter().enumerate().map(matches).collect(),
         estimator: is_similarity.then(|| "negative similarity of the best match".to_owned()),
         ..Run::default()
@@ -65,13 +70,13 @@ pub(super) fn write(
 
 /// Which references count as correct.
 fn protocol(args: &EvaluateArgs, truth: Option<&GroundTruth>) -> String {
-    match (truth, &args.ground_truth, &args.dataset) {
+    match (truth, args.truth.source(), &args.dataset) {
         (None, ..) => "nothing is judged".to_owned(),
-        (_, Some(path), _) => format!("correct references as {} lists them", path.display()),
+        (_, Some(source), _) => format!("correct references: {source}"),
         (_, _, Some(dataset)) => format!("correct references as `{dataset}` defines them"),
         _ => format!(
             "a reference is correct within {} m, the limit included",
-            args.positive_dist_threshold
+            args.truth.positive_dist_threshold
         ),
     }
 }

@@ -1,6 +1,6 @@
 //! What was retrieved for two sets of images or rows.
 
-use vpr_core::{Descriptors, GroundTruth, Ranking, Similarities, retrieve};
+use vpr_core::{Descriptors, Ranking, Similarities, retrieve};
 
 use super::named::Named;
 
@@ -19,8 +19,6 @@ pub(super) struct Retrieved {
     pub(super) confidence: Vec<f64>,
     /// Query and reference vectors, for techniques that have one per image.
     pub(super) descriptors: Option<(Descriptors, Descriptors)>,
-    /// The truth that came with the images.
-    pub(super) truth: Option<GroundTruth>,
 }
 
 impl Retrieved {
@@ -40,8 +38,24 @@ impl Retrieved {
             alone: None,
             confidence,
             descriptors,
-            truth: None,
         }
+    }
+
+    /// The most similar references of a matrix; their distances are negative similarities.
+    pub(super) fn of_scores(
+        sides: [Named; 2],
+        similarities: Similarities,
+        k: usize,
+    ) -> anyhow::Result<Self> {
+        let ranking = similarities.ranked(k)?;
+        let scores = similarities.view();
+        let of = |query: usize| {
+            ranking.indices(query).iter().map(|&reference| -scores[[query, reference]]).collect()
+        };
+        let distances = (0..ranking.len()).map(of).collect();
+        let confidence = similarities.best().confidence;
+        let retrieved = Self::new(sides, ranking, confidence, None);
+        Ok(Self { distances, similarities: Some(similarities), ..retrieved })
     }
 }
 

@@ -1,5 +1,7 @@
 //! `bench run`: experiment files.
 
+use std::path::PathBuf;
+
 use bench::study::{self, Context, Study};
 use vpr_report::cli::{self, Bar, Outcome, RunArgs};
 use vpr_study::Sources;
@@ -10,8 +12,9 @@ const CHAPTER: &str = "bench";
 pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     let experiments = args.open::<Study>(CHAPTER)?;
     let bar = Bar::default();
-    let folders = [&*args.data.data, &args.workspace_data()];
-    let sources = Sources::new(folders, &args.data.cache, &bar);
+    let (folders, cache) = (args.folders(), args.cache());
+    let folders = folders.iter().map(PathBuf::as_path);
+    let sources = Sources::new(folders, &cache, &bar);
     let without = sources.without_weights()?;
     let mut outcome = Outcome::Success;
     for experiment in &experiments {

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use vpr_data::{Severity, validate};
+use vpr_data::{Severity, validate_with};
 use vpr_report::cli::{self, Bar, DataArgs, Outcome};
-use vpr_study::Sources;
+use vpr_study::{Sources, TruthArgs};
 use vpr_vision::image;
 
 /// Which folder to look at.
@@ -16,6 +16,8 @@ pub(crate) struct ValidateArgs {
     folder: PathBuf,
     #[command(flatten)]
     data: DataArgs,
+    #[command(flatten)]
+    truth: TruthArgs,
     /// Decode every image whole, not only its header
     #[arg(long)]
     thorough: bool,
@@ -33,7 +35,7 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<Outcome> {
         let length = |pixels: usize| u32::try_from(pixels).map_err(|err| err.to_string());
         Ok((length(size.width)?, length(size.height)?))
     };
-    let problems = validate(&folder, &probe);
+    let problems = validate_with(&folder, &probe, args.truth.source().as_ref());
     for problem in &problems {
         cli::print(&format!("{problem}\n"))?;
     }
@@ -52,7 +54,8 @@ fn folder(args: &ValidateArgs) -> anyhow::Result<PathBuf> {
         anyhow::bail!("{}: is not a folder", args.folder.display());
     };
     let bar = Bar::default();
-    let sources = Sources::new([&*args.data.data, Path::new("data")], &args.data.cache, &bar);
+    let (folders, cache) = (args.data.folders(), args.data.cache());
+    let sources = Sources::new(folders.iter().map(PathBuf::as_path), &cache, &bar);
     let dataset = sources.images(name)?.context("a world has images")?;
     let image = dataset.queries.first().context("a world has queries")?;
     Ok(image.ancestors().nth(2).unwrap_or(image).to_owned())

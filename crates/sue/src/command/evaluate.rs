@@ -75,7 +75,10 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         }
     }
     cli::print(&table.render_within(args.format, cli::columns()))?;
-    report::write(&args.report, &input, &truth, runs)?;
+    if args.report.path.is_some() {
+        let poses = args.truth.query_poses(&input)?;
+        report::write(&args.report, &input, (poses.as_ref(), &truth), runs)?;
+    }
     Ok(Outcome::Success)
 }
 

@@ -9,26 +9,44 @@ use vpr_core::{
     knn::{self, Metric, RowLengths, RowSource, SearchParams, Selected},
     map::{About, Access, Names, OpenMap, Opening, Origins},
 };
-use vpr_data::exchange::{self, Format, Parts};
+use vpr_data::exchange::{self, Beside, Format, Parts};
+use vpr_report::cli;
+use vpr_study::reading::ReadingArgs;
 
-use super::normalization::{Measured, NormalizationArgs, Scale, unit_distance};
+use super::{
+    normalization::{Measured, NormalizationArgs, Scale, unit_distance},
+    scores::{Scores, ScoresArgs},
+};
 
 /// Map and queries, and what the estimators are told.
 #[derive(clap::Args)]
 pub(crate) struct InputArgs {
-    /// Descriptors of the references: a map (file or growing folder), or any file `bench map` reads
-    #[arg(long, value_name = "PATH")]
-    map: PathBuf,
-    /// Poses of the references, if the map has none
-    #[arg(long, value_name = "PATH")]
+    /// Descriptors of the references: a map (file or growing folder), or any format of
+    /// docs/formats.md
+    #[arg(
+        long,
+        value_name = "PATH",
+        required_unless_present_any = ["distances", "similarities"]
+    )]
+    map: Option<PathBuf>,
+    /// Poses of the references, instead of those that the map has
+    #[arg(long, aliases = ["poses", "map_poses"], value_name = "PATH")]
     map_poses: Option<PathBuf>,
     /// Descriptors of the queries
-    #[arg(long, value_name = "PATH")]
-    queries: PathBuf,
+    #[arg(
+        long,
+        value_name = "PATH",
+        required_unless_present_any = ["distances", "similarities"]
+    )]
+    queries: Option<PathBuf>,
     #[command(flatten)]
     normalization: NormalizationArgs,
+    #[command(flatten)]
+    scores: ScoresArgs,
+    #[command(flatten)]
+    reading: ReadingArgs,
     /// Number of best references that spatial estimators look at
-    #[arg(short, long, default_value_t = 10, value_name = "K")]
+    #[arg(short, long, default_value_t = 10, value_name = "K", value_parser = cli::at_least_one)]
     k: usize,
     /// Decay of the weights with distance
     #[arg(long, default_value_t = 350.0, value_name = "L", allow_hyphen_values = true)]
@@ -49,7 +67,7 @@ pub(crate) struct InputArgs {
     #[arg(long)]
     measured: bool,
     /// Queries at a time
-    #[arg(long, default_value_t = 1024, value_name = "N")]
+    #[arg(long, default_value_t = 1024, value_name = "N", value_parser = cli::at_least_one)]
     batch_size: usize,
 }
 
@@ -66,6 +84,8 @@ enum Decay {
 pub(crate) struct Input {
     references: Rows,
     queries: Rows,
+    /// Scores of all pairs, which stand in for the rows.
+    scores: Option<Scores>,
     /// Poses of the references.
     pub(crate) poses: Option<Poses>,
     /// Names of the references.
@@ -73,9 +93,13 @@ pub(crate) struct Input {
     /// Names of the queries.
     pub(crate) query_names: Option<Names>,
     /// Poses of the queries, if they came with them.
-    pub(crate) query_poses: Option<Poses>,
+    query_poses: Option<Poses>,
     /// What the map says about itself.
     pub(crate) about: About,
+    query_about: About,
+    /// Where the poses of queries and references are from.
+    places: [PathBuf; 2],
+    reading: ReadingArgs,
     /// What the estimators are told.
     pub(crate) settings: EstimatorSettings,
     /// How descriptors are compared.
@@ -113,6 +137,10 @@ impl Rows {
         }
     }
 
+    fn dim(&self) -> vpr_core::Result<usize> {
+        self.with(|source| Ok(source.dim()))
+    }
+
     /// As the map says, or measured.
     fn lengths(&self) -> vpr_core::Result<Option<RowLengths>> {
         if let Self::Open(map) = self
@@ -133,49 +161,64 @@ struct Side {
 }
 
 impl Side {
-    /// `measured` leaves regressed rows out.
-    fn open(path: &Path, measured: bool) -> anyhow::Result<Self> {
-        let format = Format::guess(path)?;
-        if format == Format::Map {
+    /// Opens a map, or reads a file of another format, with the poses of another file if there is
+    /// one. `measured` leaves regressed rows of a map out.
+    fn open(
+        path: &Path,
+        poses: Option<&Path>,
+        reading: ReadingArgs,
+        beside: Beside,
+        measured: bool,
+    ) -> anyhow::Result<Self> {
+        // A map shows what it is, whatever format the other side has.
+        if matches!(Format::guess(path), Ok(Format::Map)) {
             let map = OpenMap::open(path, Opening { access: Access::Read, trust: false })?;
-            let (names, poses, about) = (map.names()?, map.poses()?, map.about().clone());
+            let (names, poses, about) = match poses {
+                None => (map.names()?, map.poses()?, map.about().clone()),
+                Some(file) => {
+                    let (names, about) = (map.names()?, map.about().clone());
+                    let parts = Parts { names, about, ..Parts::default() };
+                    let joined = joined(parts, file, map.len(), reading)?;
+                    (joined.names, joined.poses, joined.about)
+                }
+            };
             let origins = map.origins()?.filter(|_| measured);
-            if let Some(rows) = origins.as_ref().map(Origins::measured_rows) {
-                let names =
-                    names.map(|names| rows.iter().filter_map(|&row| names.get(row)).collect());
-                let poses = poses.map(|poses| poses.select(&rows));
-                return Ok(Self { rows: Rows::Measured(map, rows), names, poses, about });
-            }
-            return Ok(Self { rows: Rows::Open(map), names, poses, about });
+            let Some(rows) = origins.as_ref().map(Origins::measured_rows) else {
+                return Ok(Self { rows: Rows::Open(map), names, poses, about });
+            };
+            let names = names.map(|names| rows.iter().filter_map(|&row| names.get(row)).collect());
+            let poses = poses.map(|poses| poses.select(&rows));
+            return Ok(Self { rows: Rows::Measured(map, rows), names, poses, about });
         }
-        let Parts { names, descriptors, poses, about, .. } = exchange::read(format, path)?;
+        let parts = reading.read_both(path, poses, beside)?;
         let none = || Error::Empty("descriptors").in_file(path);
-        let rows = Rows::Memory(descriptors.ok_or_else(none)?);
-        Ok(Self { rows, names, poses, about })
+        let rows = Rows::Memory(parts.descriptors.ok_or_else(none)?);
+        Ok(Self { rows, names: parts.names, poses: parts.poses, about: parts.about })
+    }
+}
+
+/// Poses of a file, as many as there are descriptors.
+fn joined(parts: Parts, file: &Path, n: usize, reading: ReadingArgs) -> anyhow::Result<Parts> {
+    let joined = reading.poses.join(parts, file)?;
+    match joined.poses.as_ref().map(Poses::len) {
+        Some(n_poses) if n_poses != n => {
+            let what = "poses, one per descriptor";
+            let err = Error::Mismatch { what, expected: n, actual: n_poses };
+            Err(err.in_file(file).into())
+        }
+        _ => Ok(joined),
     }
 }
 
 impl InputArgs {
     /// Opens both sides.
     pub(crate) fn open(&self) -> anyhow::Result<Input> {
-        let references = Side::open(&self.map, self.measured)?;
-        let queries = Side::open(&self.queries, false)?;
-        check(&references.about, &queries.about)?;
-        let mut about = references.about;
-        let mut poses = references.poses;
-        if let Some(path) = &self.map_poses {
-            let (joined, coordinates) =
-                poses_of(path, references.names.as_ref(), references.rows.len())?;
-            poses = Some(joined);
-            about.coordinates = about.coordinates.or(coordinates);
-        }
-        if queries.rows.len() == 0 {
-            return Err(Error::Empty("queries").in_file(&self.queries).into());
-        }
-        if self.batch_size == 0 {
-            let (name, value) = ("batch-size", "0".to_owned());
-            return Err(Error::Parameter { name, value, reason: "must be at least 1" }.into());
-        }
+        let scores = self.scores.open()?;
+        let (references, queries, scale) = match &scores {
+            Some(scores) => self.of_scores(scores)?,
+            None => self.sides()?,
+        };
+        let [map, query_file] = [&self.map, &self.queries].map(|it| it.clone().unwrap_or_default());
         let distance = match self.distance {
             Decay::Euclidean => DistanceKind::Euclidean,
             Decay::Squared => DistanceKind::Squared,
@@ -183,25 +226,18 @@ impl InputArgs {
         let base = *Sue::corrected().params();
         let sue = SueParams { k: self.k, lambda: self.lambda, distance, clip_m: self.clip, ..base };
         Sue::new(sue)?;
-        let dim = |rows: &Rows| rows.with(|source| Ok(source.dim()));
-        let (expected, actual) = (dim(&references.rows)?, dim(&queries.rows)?);
-        if expected != actual {
-            let what = "dimension of the query descriptors";
-            return Err(Error::Mismatch { what, expected, actual }.in_file(&self.queries).into());
-        }
-        let sides = [
-            Measured { path: &self.map, lengths: references.rows.lengths()? },
-            Measured { path: &self.queries, lengths: queries.rows.lengths()? },
-        ];
-        let scale = self.normalization.decide(about.metric.unwrap_or_default(), &sides)?;
         Ok(Input {
             references: references.rows,
             queries: queries.rows,
-            poses,
+            scores,
+            poses: references.poses,
             names: references.names,
             query_names: queries.names,
             query_poses: queries.poses,
-            about,
+            about: references.about,
+            query_about: queries.about,
+            places: [query_file, self.map_poses.clone().unwrap_or(map)],
+            reading: self.reading,
             settings: EstimatorSettings { sue, nth: self.nth },
             scale,
             ranks: self.ranks.max(self.k).max(2),
@@ -210,7 +246,76 @@ impl InputArgs {
     }
 }
 
+impl InputArgs {
+    /// Descriptors of both sides, checked against each other.
+    fn sides(&self) -> anyhow::Result<(Side, Side, Scale)> {
+        let (Some(map), Some(queries)) = (&self.map, &self.queries) else {
+            anyhow::bail!("give --map and --queries, --distances or --similarities");
+        };
+        let (poses, reading) = (self.map_poses.as_deref(), self.reading);
+        let references = Side::open(map, poses, reading, Beside::Used, self.measured)?;
+        // Poses of the queries may come from elsewhere, or not be needed.
+        let opened = Side::open(queries, None, reading, Beside::IfSound, false)?;
+        check(&references.about, &opened.about)?;
+        if opened.rows.len() == 0 {
+            return Err(Error::Empty("queries").in_file(queries).into());
+        }
+        let (expected, actual) = (references.rows.dim()?, opened.rows.dim()?);
+        if expected != actual {
+            let what = "dimension of the query descriptors";
+            return Err(Error::Mismatch { what, expected, actual }.in_file(queries).into());
+        }
+        let metric = references.about.metric.unwrap_or_default();
+        let measured = [
+            Measured { path: map, lengths: references.rows.lengths()? },
+            Measured { path: queries, lengths: opened.rows.lengths()? },
+        ];
+        let scale = self.normalization.decide(metric, &measured)?;
+        Ok((references, opened, scale))
+    }
+
+    /// Both sides of a matrix: rows that are only counted, and what a file of poses knows of the
+    /// references.
+    fn of_scores(&self, scores: &Scores) -> anyhow::Result<(Side, Side, Scale)> {
+        let side = |n: usize, parts: Parts| {
+            let rows = Rows::Memory(Descriptors::new(ndarray::Array2::zeros((n, 1)))?);
+            anyhow::Ok(Side { rows, names: parts.names, poses: parts.poses, about: parts.about })
+        };
+        let n = scores.n_references();
+        let known = match &self.map_poses {
+            Some(file) => joined(Parts::default(), file, n, self.reading)?,
+            None => Parts::default(),
+        };
+        let (references, queries) =
+            (side(n, known)?, side(scores.n_queries(), Parts::default())?);
+        Ok((references, queries, scores.length()))
+    }
+}
+
 impl Input {
+    /// Poses of the queries: those of a file, or else those that came with their descriptors;
+    /// checked against those of the references, so that distances mean something.
+    pub(crate) fn query_poses(&self, file: Option<&Path>) -> anyhow::Result<Option<Poses>> {
+        let given = file.map(|file| {
+            let parts = Parts { names: self.query_names.clone(), ..Parts::default() };
+            joined(parts, file, self.n_queries(), self.reading)
+        });
+        let (poses, coordinates) = match given.transpose()? {
+            Some(joined) => (joined.poses, joined.about.coordinates),
+            None => (self.query_poses.clone(), self.query_about.coordinates),
+        };
+        if let (Some(queries), Some(references)) = (&poses, &self.poses) {
+            let place = file.unwrap_or(&self.places[0]);
+            let queries = exchange::Side { place, poses: queries, coordinates };
+            let (place, coordinates) = (self.places[1].as_path(), self.about.coordinates);
+            let references = exchange::Side { place, poses: references, coordinates };
+            if let Some(note) = exchange::comparable(queries, references)? {
+                cli::note(&format!("note: {note}"));
+            }
+        }
+        Ok(poses)
+    }
+
     /// Number of queries.
     pub(crate) fn n_queries(&self) -> usize {
         self.queries.len()
@@ -226,6 +331,13 @@ impl Input {
         &self,
         mut then: impl FnMut(usize, &Retrieval) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
+        if let Some(scores) = &self.scores {
+            for start in (0..scores.n_queries()).step_by(self.batch_size) {
+                let end = (start + self.batch_size).min(scores.n_queries());
+                then(start, &scores.retrieve(start, end, self.ranks)?)?;
+            }
+            return Ok(());
+        }
         let is_scaled = self.scale == Scale::ToUnit;
         let metric = if is_scaled { Metric::Cosine } else { Metric::Euclidean };
         let params = SearchParams { metric, k: self.ranks, ..SearchParams::default() };
@@ -274,25 +386,6 @@ fn unit(by_cosine: &Retrieval) -> vpr_core::Result<Retrieval> {
 pub(crate) fn name_of(names: Option<&Names>, index: usize) -> String {
     let name = names.and_then(|names| names.get(index));
     name.map_or_else(|| index.to_string(), str::to_owned)
-}
-
-/// Poses from a file: by name if both have names, by order otherwise.
-pub(crate) fn poses_of(
-    path: &Path,
-    names: Option<&Names>,
-    n: usize,
-) -> anyhow::Result<(Poses, Option<vpr_core::map::Coordinates>)> {
-    let read = exchange::read(Format::guess(path)?, path)?;
-    let coordinates = read.about.coordinates;
-    let parts = Parts { names: names.cloned(), ..Parts::default() };
-    let joined = parts.join(read).map_err(|err| err.in_file(path))?;
-    let poses = joined.poses.ok_or_else(|| Error::Empty("poses").in_file(path))?;
-    if poses.len() != n {
-        let what = "poses, one per descriptor";
-        let err = Error::Mismatch { what, expected: n, actual: poses.len() };
-        return Err(err.in_file(path).into());
-    }
-    Ok((poses, coordinates))
 }
 
 /// Refuses descriptors of different encoders and coordinates of different grids.

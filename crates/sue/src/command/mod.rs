@@ -7,6 +7,7 @@ mod input;
 mod normalization;
 mod report;
 pub(crate) mod run;
+mod scores;
 mod threshold;
 pub(crate) mod train;
 mod truth;

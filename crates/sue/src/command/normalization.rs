@@ -14,10 +14,10 @@ use vpr_report::cli;
 #[derive(clap::Args)]
 pub(crate) struct NormalizationArgs {
     /// Scale descriptors to length 1, as the studies do [default: where they are not, with a warning]
-    #[arg(long, conflicts_with = "no_normalize")]
+    #[arg(long, conflicts_with_all = ["no_normalize", "distances", "similarities"])]
     normalize: bool,
     /// Take descriptors as they are, whatever their lengths
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["distances", "similarities"])]
     no_normalize: bool,
 }
 

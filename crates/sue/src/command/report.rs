@@ -1,6 +1,6 @@
 //! The report of `sue evaluate`: the same matches, ordered by every estimator.
 
-use vpr_core::{GroundTruth, Retrieval};
+use vpr_core::{GroundTruth, Poses, Retrieval};
 use vpr_report::{
     cli::{self, ReportArgs},
     report::{Dataset, Match, Report, Run},
@@ -31,16 +31,13 @@ pub(super) fn run(estimator: &str, retrieval: &Retrieval, uncertainty: Vec<f64>)
     }
 }
 
-/// Writes the report that the flags ask for, if any.
+/// Writes the report that the flags ask for.
 pub(super) fn write(
     args: &ReportArgs,
     input: &Input,
-    truth: &GroundTruth,
+    (query_poses, truth): (Option<&Poses>, &GroundTruth),
     runs: Vec<Run>,
 ) -> anyhow::Result<()> {
-    if args.path.is_none() {
-        return Ok(());
-    }
     let names = |n: usize, names: Option<&vpr_core::map::Names>| {
         (0..n).map(|index| name_of(names, index)).collect()
     };
@@ -48,7 +45,7 @@ pub(super) fn write(
         name: "queries on the map".to_owned(),
         queries: names(input.n_queries(), input.query_names.as_ref()),
         references: names(input.n_references(), input.names.as_ref()),
-        poses: input.query_poses.as_ref().zip(input.poses.as_ref()),
+        poses: query_poses.zip(input.poses.as_ref()),
         truth: Some(truth),
         thumbnails: None,
         similarities: None,

@@ -1,5 +1,7 @@
 //! `sue run`: experiment files.
 
+use std::path::PathBuf;
+
 use sue::{
     corpus::Corpora,
     study::{self, Context, Study},
@@ -13,8 +15,9 @@ const CHAPTER: &str = "sue";
 pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     let experiments = args.open::<Study>(CHAPTER)?;
     let bar = Bar::default();
-    let folders = [&*args.data.data, &args.workspace_data()];
-    let corpora = Corpora::new(Sources::new(folders, &args.data.cache, &bar));
+    let (folders, cache) = (args.folders(), args.cache());
+    let folders = folders.iter().map(PathBuf::as_path);
+    let corpora = Corpora::new(Sources::new(folders, &cache, &bar));
     let without = corpora.sources().without_weights()?;
     let mut outcome = Outcome::Success;
     for experiment in &experiments {

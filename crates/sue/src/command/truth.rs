@@ -2,57 +2,58 @@
 
 use std::path::PathBuf;
 
-use anyhow::{bail, ensure};
-use vpr_core::GroundTruth;
-use vpr_data::layout::vpr_bench::GroundTruthFile;
+use anyhow::bail;
+use vpr_core::{GroundTruth, Poses, map::Names};
+use vpr_data::truth::{Side, Sides};
 use vpr_report::cli;
 
-use super::input::{Input, poses_of};
+use super::input::Input;
 
-/// Positions with a radius, or lists.
+/// Positions with a radius, or any other truth.
 #[derive(clap::Args)]
+#[group(skip)]
 pub(crate) struct TruthArgs {
     /// Poses of the queries, if their descriptors did not come with them
-    #[arg(long, value_name = "PATH", conflicts_with = "ground_truth")]
+    #[arg(long, value_name = "PATH")]
     query_poses: Option<PathBuf>,
-    /// Correct references per query, VPR-Bench's `ground_truth_new.npy`; instead of positions
-    #[arg(long, alias = "ground_truth", value_name = "NPY")]
-    ground_truth: Option<PathBuf>,
-    /// A reference is correct within this many metres, the limit included
-    #[arg(long, alias = "positive_dist_threshold", default_value_t = 25.0, value_name = "M")]
-    positive_dist_threshold: f64,
+    #[command(flatten)]
+    other: vpr_study::TruthArgs,
 }
 
 impl TruthArgs {
     /// The correct references of every query.
     pub(crate) fn truth(&self, input: &Input) -> anyhow::Result<GroundTruth> {
-        let (n_queries, n_references) = (input.n_queries(), input.n_references());
-        if let Some(path) = &self.ground_truth {
-            let file = GroundTruthFile::read(path)?;
-            let n = file.len();
-            ensure!(n == n_queries, "{}: {n} rows for {n_queries} queries", path.display());
-            let (truth, n_clamped) = file.truth(n_references)?;
-            if n_clamped > 0 {
-                let path = path.display();
-                cli::note(&format!(
-                    "warning: {path}: {n_clamped} entries point past the {n_references} references and are dropped"
-                ));
+        if let Some(source) = self.other.source() {
+            let sides = Sides {
+                queries: side(input.n_queries(), input.query_names.as_ref()),
+                references: side(input.n_references(), input.names.as_ref()),
+            };
+            let found = source.truth(&sides)?;
+            for note in &found.notes {
+                cli::note(&format!("note: {note}"));
             }
-            return Ok(truth);
+            return Ok(found.truth);
         }
-        let given = self.query_poses.as_ref();
-        let given =
-            given.map(|path| poses_of(path, input.query_names.as_ref(), n_queries)).transpose()?;
-        if let (Some((_, Some(queries))), Some(map)) = (&given, &input.about.coordinates)
-            && queries != map
-        {
-            let (first, second) = (map.to_string(), queries.to_string());
-            return Err(sue::Error::OtherCoordinates { first, second }.into());
-        }
-        let queries = given.map(|it| it.0).or_else(|| input.query_poses.clone());
-        let (Some(queries), Some(references)) = (queries, &input.poses) else {
-            bail!("no positions: give --map-poses and --query-poses, or --ground-truth");
+        let (Some(queries), Some(references)) = (self.query_poses(input)?, &input.poses) else {
+            bail!(
+                "no positions: give --map-poses and --query-poses, or --ground-truth, --labels or \
+                 --same-index"
+            );
         };
-        Ok(GroundTruth::within_radius(&queries, references, self.positive_dist_threshold)?)
+        let radius = self.other.positive_dist_threshold;
+        Ok(GroundTruth::within_radius(&queries, references, radius)?)
+    }
+
+    /// Where the queries are, if that is known.
+    pub(crate) fn query_poses(&self, input: &Input) -> anyhow::Result<Option<Poses>> {
+        input.query_poses(self.query_poses.as_deref())
+    }
+}
+
+/// What a truth is told of one side.
+fn side(n: usize, names: Option<&Names>) -> Side {
+    match names {
+        Some(names) if names.len() == n => Side::named(names.iter().map(str::to_owned).collect()),
+        _ => Side::numbered(n),
     }
 }

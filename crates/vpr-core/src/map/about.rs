@@ -1,6 +1,10 @@
 //! What a map says about itself: encoder, images, metric, coordinate system.
 
-use std::{collections::BTreeMap, fmt, str::FromStr};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt,
+    str::FromStr,
+};
 
 use crate::knn::Metric;
 
@@ -71,6 +75,23 @@ impl About {
                 metadata.insert(key.to_owned(), value);
             }
         }
+    }
+
+    /// What is not as it was, one setting each: `encoder: HOG, was CoHOG`.
+    #[must_use]
+    pub fn changes_since(&self, before: &Self) -> Vec<String> {
+        let [mut now, mut then] = [BTreeMap::new(), BTreeMap::new()];
+        self.write_to(&mut now);
+        before.write_to(&mut then);
+        let keys: BTreeSet<&String> = now.keys().chain(then.keys()).collect();
+        let changed = keys.into_iter().filter(|key| now.get(*key) != then.get(*key));
+        let line = |key: &String| {
+            let said = |of: &BTreeMap<String, String>| {
+                of.get(key).cloned().unwrap_or_else(|| "not given".to_owned())
+            };
+            format!("{key}: {}, was {}", said(&now), said(&then))
+        };
+        changed.map(line).collect()
     }
 
     /// Takes what is known from the metadata of a file.
@@ -146,6 +167,22 @@ impl FromStr for ImageSize {
     }
 }
 
+impl UtmZone {
+    /// The zone of a number from 1 to 60 and a latitude band: C to M lie south of the equator, N to X
+    /// north. There are no bands I and O.
+    ///
+    /// A band is not a hemisphere: band S lies north, from 32° to 40°.
+    #[must_use]
+    pub fn of_band(number: u8, band: char) -> Option<Self> {
+        let south = match band.to_ascii_uppercase() {
+            'C'..='H' | 'J'..='M' => true,
+            'N' | 'P'..='X' => false,
+            _ => return None,
+        };
+        (1..=60).contains(&number).then_some(Self { number, south })
+    }
+}
+
 impl fmt::Display for UtmZone {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}{}", self.number, if self.south { 'S' } else { 'N' })
@@ -216,6 +253,29 @@ mod tests {
         about.write_to(&mut metadata);
         assert_eq!(metadata["coordinates"], "utm 32S");
         assert_eq!(About::read_from(&metadata).unwrap(), about);
+    }
+
+    #[test]
+    fn changes_are_listed_setting_by_setting() {
+        let encoder = |name: &str| Some(name.to_owned());
+        let before = About { encoder: encoder("HOG"), ..About::default() };
+        let coordinates = Some(Coordinates::Local);
+        let now = About { encoder: encoder("CoHOG"), coordinates, ..About::default() };
+        let expected = ["coordinates: local, was not given", "encoder: CoHOG, was HOG"];
+        assert_eq!(now.changes_since(&before), expected);
+        assert_eq!(now.changes_since(&now), Vec::<String>::new());
+    }
+
+    #[test]
+    fn bands_of_one_hemisphere_are_one_zone() {
+        let zone = |number, band| UtmZone::of_band(number, band);
+        assert_eq!(zone(18, 'S'), zone(18, 'T'));
+        assert_eq!(zone(18, 'T'), Some(UtmZone { number: 18, south: false }));
+        assert_eq!(zone(18, 'n').unwrap().to_string(), "18N");
+        assert_eq!([zone(18, 'M'), zone(18, 'C')], [Some(UtmZone { number: 18, south: true }); 2]);
+        for wrong in [zone(0, 'N'), zone(61, 'N'), zone(1, 'I'), zone(1, 'O'), zone(1, 'Y')] {
+            assert_eq!(wrong, None);
+        }
     }
 
     #[test]

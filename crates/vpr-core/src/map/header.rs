@@ -19,28 +19,40 @@ pub enum ElementType {
     U8,
     /// Signed byte.
     I8,
+    /// Signed 16-bit integer.
+    I16,
+    /// Unsigned 16-bit integer.
+    U16,
     /// Half-precision float.
     F16,
+    /// The upper half of a single-precision float.
+    BF16,
+    /// Signed 32-bit integer.
+    I32,
+    /// Unsigned 32-bit integer.
+    U32,
     /// Signed 64-bit integer.
     I64,
+    /// Unsigned 64-bit integer.
+    U64,
     /// Single-precision float.
     F32,
     /// Double-precision float.
     F64,
-    /// One of the format's types that no map uses.
+    /// One of the format's other types: truth values, eight-bit floats.
     #[serde(other)]
     Other,
 }
 
 impl ElementType {
-    /// Bytes of one element; `None` for types that no map uses.
+    /// Bytes of one element; `None` for [`Self::Other`].
     #[must_use]
     pub fn size(self) -> Option<u64> {
         match self {
             Self::U8 | Self::I8 => Some(1),
-            Self::F16 => Some(2),
-            Self::F32 => Some(4),
-            Self::I64 | Self::F64 => Some(8),
+            Self::F16 | Self::BF16 | Self::I16 | Self::U16 => Some(2),
+            Self::F32 | Self::I32 | Self::U32 => Some(4),
+            Self::I64 | Self::U64 | Self::F64 => Some(8),
             Self::Other => None,
         }
     }

@@ -8,6 +8,7 @@ mod digest;
 mod file;
 mod header;
 mod layout;
+mod lock;
 mod names;
 mod open_map;
 mod origins;

@@ -1,5 +1,7 @@
 //! The names of a map's images, in one piece of memory.
 
+use std::collections::HashMap;
+
 use crate::{Error, Result};
 
 /// Image names, one per row of a map.
@@ -79,6 +81,16 @@ impl Names {
         Ok(Self { text, ends })
     }
 
+    /// The first name that two images have, and the first two rows it stands in.
+    #[must_use]
+    pub fn repeated(&self) -> Option<(&str, [usize; 2])> {
+        let mut row_of = HashMap::with_capacity(self.len());
+        self.iter().zip(0..).find_map(|(name, row)| {
+            let first = row_of.insert(name, row)?;
+            Some((name, [first, row]))
+        })
+    }
+
     /// Checks that there are as many names as rows.
     ///
     /// # Errors
@@ -114,6 +126,13 @@ mod tests {
         let back = Names::from_parts(text.as_bytes().to_vec(), &offsets).unwrap();
         assert_eq!(back, names);
         assert_eq!(back.get(2), Some("straße.png"));
+    }
+
+    #[test]
+    fn a_repeated_name_is_found_with_its_rows() {
+        let names = |names: &[&str]| names.iter().collect::<Names>();
+        assert_eq!(names(&["a", "b", "c", "b", "a"]).repeated(), Some(("b", [1, 3])));
+        assert_eq!(names(&["a", "A", "ab"]).repeated(), None);
     }
 
     #[test]

@@ -8,7 +8,7 @@ use std::{
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 
-use super::{About, BlockDigest, MapFile, MapWriter, Names, Opening, RowType, layout};
+use super::{About, BlockDigest, MapFile, MapWriter, Names, Opening, RowType, layout, lock};
 use crate::{Error, Poses, Result};
 use vpr_files::replace;
 
@@ -125,14 +125,12 @@ impl GrowingMap {
     ///
     /// # Errors
     ///
-    /// [`Error::Io`] if the folder cannot be written or another process is appending to it,
+    /// [`Error::Io`] if the folder cannot be written or another process is appending to it, and which,
     /// [`Error::Format`] if what is there is damaged, [`Error::Parameter`] if it has another row
     /// type, encoder, metric or coordinate system.
     pub fn open(folder: &Path, row_type: RowType, about: About) -> Result<Self> {
         fs::create_dir_all(folder).map_err(Error::io(folder))?;
-        let lock_path = folder.join(LOCK);
-        let lock = File::create(&lock_path).map_err(Error::io(&lock_path))?;
-        lock.try_lock().map_err(|err| Error::Io { path: lock_path, source: err.into() })?;
+        let lock = lock::take(&folder.join(LOCK))?;
         let folder = folder.to_owned();
         if !folder.join(MANIFEST).exists() {
             let manifest = Manifest::sealed(Vec::new());
@@ -144,7 +142,12 @@ impl GrowingMap {
         if let Some(first) = manifest.segments.first() {
             let first = first.open(&folder, Opening::default())?;
             agree("row_type", first.row_type(), row_type)?;
-            agree("about", format!("{:?}", first.about()), format!("{about:?}"))?;
+            let changed = about.changes_since(first.about());
+            if !changed.is_empty() {
+                let (name, value) = ("settings", changed.join("; "));
+                let reason = "all segments of a map must agree";
+                return Err(Error::Parameter { name, value, reason });
+            }
             kind = Some(Kind::of_file(&first));
         }
         Ok(Self { folder, manifest, row_type, about, kind, _lock: lock })

@@ -65,6 +65,27 @@ impl LatLon {
         PlanarPosition::new(FALSE_EASTING + radius * eta, northing)
     }
 
+    /// Grid metres per metre on the ground at this point: 0.9996 on the zone's central meridian, 1.001
+    /// at its edges on the equator, more beyond. The same in all directions, for the grid is
+    /// conformal.
+    #[must_use]
+    pub fn scale(self, zone: UtmZone) -> f64 {
+        const STEP_DEG: f64 = 1e-3;
+        let at = |step: f64| Self { lat: self.lat + step, ..self }.to_utm(zone);
+        let on_grid = (at(STEP_DEG) - at(-STEP_DEG)).norm();
+        let e2 = eccentricity_squared();
+        let sin = self.lat.to_radians().sin();
+        let meridian_radius = AXIS * (1.0 - e2) / (1.0 - e2 * sin * sin).powf(1.5);
+        on_grid / (meridian_radius * (2.0 * STEP_DEG).to_radians())
+    }
+
+    /// Degrees of longitude between this point and the central meridian of a zone, 0 to 180.
+    #[must_use]
+    pub fn degrees_from(self, zone: UtmZone) -> f64 {
+        let apart = (self.lon - central_meridian(zone)).rem_euclid(360.0);
+        apart.min(360.0 - apart)
+    }
+
     /// The point at an easting and northing in metres of a zone; the inverse of [`Self::to_utm`].
     #[must_use]
     pub fn from_utm(position: PlanarPosition, zone: UtmZone) -> Self {
@@ -189,6 +210,39 @@ mod tests {
             let back = LatLon::from_utm(point.to_utm(zone), zone);
             assert!((back.lat - lat).abs() < 1e-12 && (back.lon - lon).abs() < 1e-12, "{back:?}");
         }
+    }
+
+    /// Snyder, Map Projections (1987), equation 8-11, in terms of the latitude: good to 1e-8 within
+    /// a few degrees of the meridian.
+    fn series_scale(lat: f64, degrees: f64) -> f64 {
+        let (sin, cos) = lat.to_radians().sin_cos();
+        let second = eccentricity_squared() / (1.0 - eccentricity_squared());
+        let (t, c) = ((sin / cos).powi(2), second * cos * cos);
+        let a = degrees.to_radians() * cos;
+        let fourth = 5.0 - 4.0 * t + 42.0 * c + 13.0 * c * c - 28.0 * second;
+        let sixth = 61.0 - 148.0 * t + 16.0 * t * t;
+        let series =
+            (1.0 + c) * a.powi(2) / 2.0 + fourth * a.powi(4) / 24.0 + sixth * a.powi(6) / 720.0;
+        SCALE * (1.0 + series)
+    }
+
+    #[test]
+    fn the_scale_is_that_of_snyders_series() {
+        let zone = UtmZone { number: 31, south: false };
+        for (lat, lon) in [(0.0, 3.0), (0.0, 6.0), (51.4779, -0.0005), (-40.0, 4.5), (60.0, 9.0)] {
+            let point = LatLon { lat, lon };
+            let error = point.scale(zone) - series_scale(lat, lon - 3.0);
+            assert!(error.abs() < 2e-8, "{lat} {lon}: off by {error}");
+        }
+        let edge = LatLon { lat: 0.0, lon: 0.0 }.scale(zone);
+        assert!((edge - 1.000_98).abs() < 1e-5, "{edge}");
+    }
+
+    #[test]
+    fn degrees_are_counted_the_short_way_round() {
+        let first = UtmZone { number: 1, south: false };
+        let from = |lon| LatLon { lat: 0.0, lon }.degrees_from(first);
+        assert_eq!([from(-177.0), from(-180.0), from(179.0), from(3.0)], [0.0, 3.0, 4.0, 180.0]);
     }
 
     #[test]

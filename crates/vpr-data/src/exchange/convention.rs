@@ -1,5 +1,7 @@
 //! How files write poses: the order of a quaternion's numbers and the direction of a transform.
 
+use std::{fmt, str::FromStr};
+
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion};
 
 use vpr_core::Pose;
@@ -17,10 +19,47 @@ pub enum QuaternionOrder {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// A point in the camera's frame becomes one in the world's; the translation is the camera's
-    /// position. 7-Scenes, TUM, KITTI, and [`Pose`].
+    /// position. 7-Scenes, TUM, KITTI, `EuRoC`, and [`Pose`].
     WorldFromCamera,
-    /// A point in the world's frame becomes one in the camera's. COLMAP, hloc, kapture.
+    /// A point in the world's frame becomes one in the camera's, whose position is `−Rᵀ t`. COLMAP,
+    /// hloc, kapture.
     CameraFromWorld,
+    /// The translation is the camera's position, but the quaternion turns the world's axes into the
+    /// camera's. Some tables are like this.
+    CameraFromWorldRotation,
+}
+
+impl Direction {
+    /// All directions.
+    pub const ALL: [Self; 3] =
+        [Self::WorldFromCamera, Self::CameraFromWorld, Self::CameraFromWorldRotation];
+
+    /// The name that is typed.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::WorldFromCamera => "world-from-camera",
+            Self::CameraFromWorld => "camera-from-world",
+            Self::CameraFromWorldRotation => "camera-from-world-rotation",
+        }
+    }
+}
+
+impl fmt::Display for Direction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Direction {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|it| it.name() == text).ok_or_else(|| {
+            let known = Self::ALL.map(Self::name).join(", ");
+            format!("`{}` is none of {known}", vpr_files::shorten(text))
+        })
+    }
 }
 
 /// How a format writes poses; a named choice per format, nothing is guessed from the numbers.
@@ -47,6 +86,15 @@ impl PoseConvention {
     /// `tx ty tz qx qy qz qw`, world from camera, as the TUM benchmark writes them.
     pub const TUM: Self =
         Self { order: QuaternionOrder::Xyzw, direction: Direction::WorldFromCamera };
+    /// Real part first, world from camera: tables by title, and our own files.
+    pub const TABLE: Self =
+        Self { order: QuaternionOrder::Wxyz, direction: Direction::WorldFromCamera };
+
+    /// The same with another direction, if one is named.
+    #[must_use]
+    pub fn directed(self, direction: Option<Direction>) -> Self {
+        Self { direction: direction.unwrap_or(self.direction), ..self }
+    }
 
     /// The pose of a translation and a quaternion in this convention.
     ///
@@ -82,6 +130,9 @@ impl PoseConvention {
         match self.direction {
             Direction::WorldFromCamera => pose,
             Direction::CameraFromWorld => pose.inverse(),
+            Direction::CameraFromWorldRotation => {
+                Isometry3::from_parts(pose.translation, pose.rotation.inverse())
+            }
         }
     }
 }
@@ -121,6 +172,25 @@ mod tests {
         let hloc = PoseConvention::HLOC.pose([-2.0, 1.0, -3.0], [half, 0.0, 0.0, -half]).unwrap();
         assert!((tum.inverse() * hloc).translation.vector.norm() < 1e-12);
         assert!(tum.rotation.angle_to(&hloc.rotation) < 1e-7);
+    }
+
+    #[test]
+    fn a_quaternion_may_turn_the_other_way_than_the_position_says() {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let turned = [half, 0.0, 0.0, -half];
+        let direct = PoseConvention::TABLE.pose([1.0, 2.0, 3.0], [half, 0.0, 0.0, half]).unwrap();
+        for (direction, translation) in [
+            (Direction::CameraFromWorldRotation, [1.0, 2.0, 3.0]),
+            (Direction::CameraFromWorld, [-2.0, 1.0, -3.0]),
+        ] {
+            let convention = PoseConvention::TABLE.directed(Some(direction));
+            let pose = convention.pose(translation, turned).unwrap();
+            assert!((pose.translation.vector - direct.translation.vector).norm() < 1e-12);
+            assert!(pose.rotation.angle_to(&direct.rotation) < 1e-7, "{direction}");
+            let (back, _) = convention.parts(&pose);
+            assert!(back.iter().zip(translation).all(|(a, b)| (a - b).abs() < 1e-12));
+            assert_eq!(direction.to_string().parse(), Ok(direction));
+        }
     }
 
     #[test]

@@ -3,7 +3,8 @@
 use std::{fmt, path::Path, str::FromStr};
 
 use super::{
-    hdf5, hloc_pairs, hloc_poses, kapture, kitti, lat_lon, methods_evaluation, npy, npz,
+    Reading, colmap, hdf5, hloc_pairs, hloc_poses, kapture, kitti, lat_lon, methods_evaluation,
+    npy, npz,
     parts::{Pairs, Parts},
     pose_csv, report, safetensors, seven_scenes, tum, utm_names,
 };
@@ -29,6 +30,8 @@ pub enum Format {
     HlocPairs,
     /// `hloc-poses`: `name qw qx qy qz tx ty tz` per line, camera from world.
     HlocPoses,
+    /// `colmap`: `images.txt` or `images.bin` of a reconstruction, camera from world.
+    Colmap,
     /// `vpr-eval`: the database's descriptors, or the predictions, of VPR-methods-evaluation.
     VprEval,
     /// `vpr-eval-queries`: the queries' descriptors of VPR-methods-evaluation.
@@ -41,9 +44,9 @@ pub enum Format {
     Kitti,
     /// `7scenes`: pose files of one sequence.
     SevenScenes,
-    /// `latlon`: CSV of latitude and longitude.
+    /// `latlon`: a table of latitude and longitude.
     LatLon,
-    /// `csv`: CSV of poses.
+    /// `csv`: a table of poses, columns by their titles.
     PoseCsv,
     /// `utm-names`: image names `@utm_east@utm_north@…`, a folder of them or a list.
     UtmNames,
@@ -64,7 +67,7 @@ pub enum Kind {
 
 impl Format {
     /// All formats.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Map,
         Self::Npy,
         Self::Npz,
@@ -72,6 +75,7 @@ impl Format {
         Self::HlocH5,
         Self::HlocPairs,
         Self::HlocPoses,
+        Self::Colmap,
         Self::VprEval,
         Self::VprEvalQueries,
         Self::Kapture,
@@ -94,6 +98,7 @@ impl Format {
             Self::HlocH5 => "hloc-h5",
             Self::HlocPairs => "hloc-pairs",
             Self::HlocPoses => "hloc-poses",
+            Self::Colmap => "colmap",
             Self::VprEval => "vpr-eval",
             Self::VprEvalQueries => "vpr-eval-queries",
             Self::Kapture => "kapture",
@@ -119,6 +124,7 @@ impl Format {
             Self::VprEval => Kind::DescriptorsAndPairs,
             Self::HlocPairs => Kind::Pairs,
             Self::HlocPoses
+            | Self::Colmap
             | Self::Kapture
             | Self::Tum
             | Self::Kitti
@@ -127,6 +133,13 @@ impl Format {
             | Self::PoseCsv
             | Self::UtmNames => Kind::Poses,
         }
+    }
+}
+
+impl Format {
+    /// Whether its files do not say which way their poses go.
+    fn leaves_direction_open(self) -> bool {
+        matches!(self, Self::PoseCsv | Self::Tum | Self::Npy)
     }
 }
 
@@ -139,7 +152,11 @@ impl fmt::Display for Format {
 impl FromStr for Format {
     type Err = Error;
 
+    /// Reads a format's name, or that of a program or dataset whose tables of poses are read.
     fn from_str(text: &str) -> Result<Self> {
+        if ["euroc", "mapillary"].contains(&text) {
+            return Ok(Self::PoseCsv);
+        }
         Self::ALL.into_iter().find(|format| format.name() == text).ok_or_else(|| Error::Unknown {
             kind: "format",
             name: text.to_owned(),
@@ -148,25 +165,31 @@ impl FromStr for Format {
     }
 }
 
-fn read_all(format: Format, path: &Path) -> report::Read<Parts> {
+fn read_all(format: Format, path: &Path, reading: Reading) -> report::Read<Parts> {
+    if let Some(direction) = reading.direction.filter(|_| !format.leaves_direction_open()) {
+        let reason = "this format says itself which way its poses go";
+        let (name, value) = ("pose-direction", format!("{direction}, of {format}"));
+        return Err(vec![Error::Parameter { name, value, reason }]);
+    }
     let read = match format {
         Format::Map => OpenMap::open(path, Opening::default())
             .and_then(|map| Parts::of_map(&map))
             .map_err(|err| vec![err]),
-        Format::Npy => npy::read(path),
+        Format::Npy => npy::read(path, reading),
         Format::Npz => npz::read(path),
         Format::Safetensors => safetensors::read(path),
         Format::HlocH5 => hdf5::read(path),
         Format::HlocPoses => hloc_poses::read(path),
+        Format::Colmap => colmap::read(path),
         Format::VprEval => methods_evaluation::read(path, methods_evaluation::DATABASE),
         Format::VprEvalQueries => methods_evaluation::read(path, methods_evaluation::QUERIES),
         Format::Kapture => kapture::read(path),
-        Format::Tum => tum::read(path),
+        Format::Tum => tum::read(path, reading),
         Format::Kitti => kitti::read(path),
         Format::SevenScenes => seven_scenes::read(path),
-        Format::LatLon => lat_lon::read(path),
-        Format::PoseCsv => pose_csv::read(path),
-        Format::UtmNames => utm_names::read(path),
+        Format::LatLon => lat_lon::read(path, reading),
+        Format::PoseCsv => pose_csv::read(path, reading),
+        Format::UtmNames => utm_names::read(path, reading),
         Format::HlocPairs => return Err(vec![other_kind(format, "images")]),
     };
     read.map_err(|problems| problems.into_iter().map(|err| err.in_file(path)).collect())
@@ -187,7 +210,16 @@ fn read_all_pairs(format: Format, path: &Path) -> report::Read<Pairs> {
 /// [`Error::Io`], or the first problem of the file and how many more there are; [`problems`] lists
 /// them. [`Error::Parameter`] if the format holds pairs.
 pub fn read(format: Format, path: &Path) -> Result<Parts> {
-    read_all(format, path).map_err(report::first)
+    read_with(format, path, Reading::default())
+}
+
+/// Reads what a file knows of images, told what it does not say itself.
+///
+/// # Errors
+///
+/// Those of [`read`]; [`Error::Parameter`] if a direction is named for a format that has its own.
+pub fn read_with(format: Format, path: &Path, reading: Reading) -> Result<Parts> {
+    read_all(format, path, reading).map_err(report::first)
 }
 
 /// Reads references per query.
@@ -203,7 +235,7 @@ pub fn read_pairs(format: Format, path: &Path) -> Result<Pairs> {
 #[must_use]
 pub fn problems(format: Format, path: &Path) -> Vec<Error> {
     let pairs = || read_all_pairs(format, path).err().unwrap_or_default();
-    let images = || read_all(format, path).err().unwrap_or_default();
+    let images = || read_all(format, path, Reading::default()).err().unwrap_or_default();
     match format {
         Format::Map => verify(path),
         Format::HlocPairs => pairs(),
@@ -216,12 +248,13 @@ pub fn problems(format: Format, path: &Path) -> Vec<Error> {
     }
 }
 
-/// Writes what is known of images; what the format has no place for is left out.
+/// Writes what is known of images; what the format has no place for is left out, see [`left_out`].
 ///
 /// # Errors
 ///
 /// [`Error::Io`]; [`Error::Empty`] or [`Error::PoseKind`] if the format needs what is not known;
-/// [`Error::Parameter`] if the format holds pairs.
+/// [`Error::Format`] if it would not give a name back as it is; [`Error::Parameter`] if it holds
+/// pairs.
 pub fn write(format: Format, path: &Path, parts: &Parts) -> Result<()> {
     match format {
         Format::Map => parts.write_map(path, RowType::F32),
@@ -230,6 +263,7 @@ pub fn write(format: Format, path: &Path, parts: &Parts) -> Result<()> {
         Format::Safetensors => safetensors::write(path, parts),
         Format::HlocH5 => hdf5::write(path, parts),
         Format::HlocPoses => hloc_poses::write(path, parts),
+        Format::Colmap => colmap::write(path, parts),
         Format::VprEval => methods_evaluation::write(path, methods_evaluation::DATABASE, parts),
         Format::VprEvalQueries => {
             methods_evaluation::write(path, methods_evaluation::QUERIES, parts)
@@ -245,11 +279,38 @@ pub fn write(format: Format, path: &Path, parts: &Parts) -> Result<()> {
     }
 }
 
+/// What of these parts [`write`] leaves out, since the format has no place for it.
+#[must_use]
+pub fn left_out(format: Format, parts: &Parts) -> Vec<&'static str> {
+    use Format::{HlocH5, Kitti, Map, Npy, Npz, Safetensors, SevenScenes, Tum, VprEval};
+    let has_descriptors = format.kind() != Kind::Poses;
+    let has_poses = matches!(format, Map | Npy | Npz | Safetensors) || format.kind() == Kind::Poses;
+    let has_names = match format {
+        Kitti | VprEval | Format::VprEvalQueries => false,
+        // Their names are those of poses.
+        Npy => parts.poses.is_some(),
+        Tum => parts.names.is_none() || tum::timestamps(parts).is_some(),
+        SevenScenes => parts.names.as_ref().is_none_or(seven_scenes::are_frames),
+        _ => true,
+    };
+    let mut left_out = Vec::new();
+    let mut check = |is_there: bool, has_place: bool, what| {
+        if is_there && !has_place {
+            left_out.push(what);
+        }
+    };
+    check(parts.descriptors.is_some(), has_descriptors, "descriptors");
+    check(parts.poses.is_some(), has_poses && format != HlocH5, "poses");
+    check(parts.names.is_some(), has_names, "names");
+    left_out
+}
+
 /// Writes references per query.
 ///
 /// # Errors
 ///
-/// [`Error::Io`]; [`Error::Parameter`] if the format holds no pairs.
+/// [`Error::Io`]; [`Error::Format`] if the format would not give a name back as it is;
+/// [`Error::Parameter`] if it holds no pairs.
 pub fn write_pairs(format: Format, path: &Path, pairs: &Pairs) -> Result<()> {
     match format {
         Format::HlocPairs => hloc_pairs::write(path, pairs),

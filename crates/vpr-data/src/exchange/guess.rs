@@ -2,7 +2,7 @@
 
 use std::{fs::File, path::Path};
 
-use super::Format;
+use super::{Format, colmap, table};
 use vpr_core::{Error, Result, map::Header};
 
 impl Format {
@@ -16,21 +16,46 @@ impl Format {
         let guess = if metadata.is_dir() { of_folder(path)? } else { of_file(path)? };
         guess.ok_or_else(|| {
             let known = Self::ALL.map(Self::name).join(", ");
-            let reason = format!("does not say of which format it is; name one of {known}");
+            let reason = format!("{UNSAID}; known are {known}");
             Error::format(path, "name", reason)
+        })
+    }
+
+    /// The format of what lies at `path`, for a program whose flag `flag` names one if that is in
+    /// doubt: one of those that fit.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::guess`].
+    pub fn guess_or(path: &Path, flag: &str, fits: impl Fn(Self) -> bool) -> Result<Self> {
+        Self::guess(path).map_err(|err| match err {
+            Error::Format { path, place, reason } if reason.starts_with(UNSAID) => {
+                let known = Self::ALL.into_iter().filter(|it| fits(*it)).map(Self::name);
+                let known = known.collect::<Vec<_>>().join(", ");
+                let reason = format!("{UNSAID}; give `{flag}` one of {known}");
+                Error::Format { path, place, reason }
+            }
+            err => err,
         })
     }
 }
 
+/// What is said of a path that tells nothing.
+const UNSAID: &str = "does not say of which format it is";
+
 fn of_file(path: &Path) -> Result<Option<Format>> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    let stem = path.file_stem().unwrap_or_default();
     Ok(match extension.as_str() {
         "npy" => Some(Format::Npy),
         "npz" => Some(Format::Npz),
         "h5" | "hdf5" => Some(Format::HlocH5),
         "tum" => Some(Format::Tum),
         "kitti" => Some(Format::Kitti),
-        "csv" => Some(of_csv(path)?),
+        "csv" | "tsv" => Some(of_table(path)?),
+        "txt" | "bin" if stem == "images" => Some(Format::Colmap),
+        // Other texts have no header, or are read by it.
+        "txt" if table::is_table(path)? => Some(of_table(path)?),
         "safetensors" => {
             let file = File::open(path).map_err(Error::io(path))?;
             let (header, _) = Header::read(path, &file)?;
@@ -42,15 +67,9 @@ fn of_file(path: &Path) -> Result<Option<Format>> {
     })
 }
 
-/// Pose tables have `easting` or `x`, tables of latitudes have `lat`.
-fn of_csv(path: &Path) -> Result<Format> {
-    let mut reader = csv::ReaderBuilder::new()
-        .trim(csv::Trim::All)
-        .from_path(path)
-        .map_err(|err| Error::format(path, "line 1", err.to_string()))?;
-    let header = reader.headers().map_err(|err| Error::format(path, "line 1", err.to_string()))?;
-    let is_latitude = |title: &str| matches!(title.to_lowercase().as_str(), "lat" | "latitude");
-    Ok(if header.iter().any(is_latitude) { Format::LatLon } else { Format::PoseCsv })
+/// Tables with positions in degrees only are those of latitudes.
+fn of_table(path: &Path) -> Result<Format> {
+    Ok(if table::is_in_degrees(path)? { Format::LatLon } else { Format::PoseCsv })
 }
 
 fn of_folder(path: &Path) -> Result<Option<Format>> {
@@ -60,6 +79,9 @@ fn of_folder(path: &Path) -> Result<Option<Format>> {
     }
     if has("sensors/trajectories.txt") {
         return Ok(Some(Format::Kapture));
+    }
+    if colmap::is_in(path) {
+        return Ok(Some(Format::Colmap));
     }
     if has("database_descriptors.npy") || has("preds") {
         return Ok(Some(Format::VprEval));

@@ -3,6 +3,7 @@
 use std::{collections::HashMap, fmt::Write as _, path::Path};
 
 use super::{
+    held,
     parts::{PairList, Pairs},
     report::{Read, Report, content_lines, read_text},
 };
@@ -18,7 +19,9 @@ pub(super) fn read(path: &Path) -> Read<Pairs> {
         let mut fields = content.split_whitespace();
         let (Some(query), Some(reference), None) = (fields.next(), fields.next(), fields.next())
         else {
-            report.line(line, "is no pair: expected the names of a query and a reference");
+            let reason =
+                "is no pair: expected the names of a query and a reference, without blanks";
+            report.line(line, reason);
             continue;
         };
         let list = *list_of.entry(query).or_insert_with(|| {
@@ -33,7 +36,9 @@ pub(super) fn read(path: &Path) -> Read<Pairs> {
 pub(super) fn write(path: &Path, pairs: &Pairs) -> Result<()> {
     let mut text = String::new();
     for PairList { query, references } in &pairs.lists {
+        held::Names::Words.check(path, query)?;
         for reference in references {
+            held::Names::Words.check(path, reference)?;
             let _ = writeln!(text, "{query} {reference}");
         }
     }

@@ -4,6 +4,7 @@ use std::{fmt::Write as _, path::Path};
 
 use super::{
     convention::PoseConvention,
+    held,
     parts::Parts,
     report::{Read, Report, content_lines, joined, numbers, read_text},
 };
@@ -31,6 +32,7 @@ pub(super) fn read(path: &Path) -> Read<Parts> {
 }
 
 pub(super) fn write(path: &Path, parts: &Parts) -> Result<()> {
+    held::Names::Words.check_all(path, parts)?;
     let mut text = String::new();
     for (row, pose) in parts.six_dof()?.iter().enumerate() {
         let (translation, wxyz) = PoseConvention::HLOC.parts(pose);

@@ -1,9 +1,14 @@
 //! What VPR-methods-evaluation saves: descriptors of both sides, and predictions per query.
 
-use std::{fmt::Write as _, fs, path::Path};
+use std::{
+    collections::HashMap,
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+};
 
 use super::{
-    npy,
+    held, npy,
     parts::{PairList, Pairs, Parts},
     report::{Read, Report, read_text},
 };
@@ -17,8 +22,7 @@ pub(super) const QUERIES: &str = "queries_descriptors.npy";
 const PREDICTIONS: &str = "preds";
 
 pub(super) fn read(folder: &Path, file: &str) -> Read<Parts> {
-    let descriptors = npy::read_descriptors(&folder.join(file)).map_err(|err| vec![err])?;
-    Ok(Parts { descriptors: Some(descriptors), ..Parts::default() })
+    npy::read_descriptors(&folder.join(file)).map_err(|err| vec![err])
 }
 
 pub(super) fn write(folder: &Path, file: &str, parts: &Parts) -> Result<()> {
@@ -29,16 +33,25 @@ pub(super) fn write(folder: &Path, file: &str, parts: &Parts) -> Result<()> {
 /// Reads `preds/*.txt` of a log folder, in the order of their numbers.
 pub(super) fn read_pairs(folder: &Path) -> Read<Pairs> {
     let folder = folder.join(PREDICTIONS);
-    let entries = fs::read_dir(&folder).map_err(|source| vec![Error::io(&folder)(source)])?;
-    let files = entries.flatten().map(|entry| entry.path());
-    let mut files: Vec<_> =
-        files.filter(|file| file.extension().is_some_and(|it| it == "txt")).collect();
+    let wrong = |source| vec![Error::io(&folder)(source)];
+    let entries = fs::read_dir(&folder).map_err(wrong)?;
+    let files = entries.map(|entry| entry.map(|entry| entry.path()));
+    let mut files: Vec<PathBuf> = files.collect::<Result<_, _>>().map_err(wrong)?;
+    files.retain(|file| file.extension().is_some_and(|it| it == "txt"));
     files.sort_by_key(|file| file.file_stem().map(|stem| (stem.len(), stem.to_owned())));
     let mut report = Report::new(&folder);
     let mut pairs = Pairs::default();
+    let mut file_of: HashMap<String, String> = HashMap::new();
     for file in files {
+        let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
         match read_list(&file) {
-            Ok(list) => pairs.lists.push(list),
+            Ok(list) => {
+                if let Some(first) = file_of.insert(list.query.clone(), name.clone()) {
+                    let query = vpr_files::shorten(&list.query);
+                    report.at(name, format!("`{query}` is the query of {first}, too"));
+                }
+                pairs.lists.push(list);
+            }
             Err(problems) => report.errors(problems),
         }
     }
@@ -71,11 +84,14 @@ pub(super) fn write_pairs(folder: &Path, pairs: &Pairs) -> Result<()> {
     let folder = folder.join(PREDICTIONS);
     fs::create_dir_all(&folder).map_err(Error::io(&folder))?;
     for (index, PairList { query, references }) in pairs.lists.iter().enumerate() {
+        let path = folder.join(format!("{index:03}.txt"));
+        held::Names::Line.check(&path, query)?;
+        references.iter().try_for_each(|name| held::Names::Line.check(&path, name))?;
         let mut text = format!("Query path:\n{query}\n\nPredictions paths:\n");
         for reference in references {
             let _ = writeln!(text, "{reference}");
         }
-        replace(&folder.join(format!("{index:03}.txt")), text.as_bytes())?;
+        replace(&path, text.as_bytes())?;
     }
     Ok(())
 }

@@ -8,19 +8,22 @@ use std::{
 use nalgebra::{Isometry3, Point2, Point3};
 use ndarray::{Array1, Array2};
 
-use super::{
-    convention::{Direction, PoseConvention, QuaternionOrder},
-    parts::Parts,
-    report::Read,
-};
+use super::{convention::PoseConvention, parts::Parts, report::Read, rounded};
 use vpr_core::{Descriptors, Error, Poses, Result, map::Names};
-use vpr_files::{NewFile, npy::npz};
+use vpr_files::{NewFile, npy::npz, shorten};
 
-/// Our own: wxyz, world from camera.
-const OURS: PoseConvention =
-    PoseConvention { order: QuaternionOrder::Wxyz, direction: Direction::WorldFromCamera };
+const DESCRIPTORS: &str = "descriptors";
+const POSITIONS: &str = "positions";
+const ORIENTATIONS: &str = "orientations";
+const OFFSETS: &str = "name_offsets";
+/// Arrays of names: ours, and what others call theirs.
+const NAMES: [&str; 8] =
+    ["names", "name", "image_names", "images", "filenames", "files", "paths", "keys"];
+/// `NumPy`'s names of the types that may be texts.
+const TEXTS: [&str; 3] = ["str", "bytes", "object"];
 
-/// `descriptors` must be there; `positions`, `orientations`, `names` and `name_offsets` may be.
+/// Descriptors are the array `descriptors`, or the only matrix of numbers, if there are any;
+/// `positions`, `orientations` and names (texts, objects, or bytes with `name_offsets`) may be there.
 pub(super) fn read(path: &Path) -> Read<Parts> {
     read_parts(path).map_err(|err| vec![err])
 }
@@ -28,24 +31,91 @@ pub(super) fn read(path: &Path) -> Read<Parts> {
 fn read_parts(path: &Path) -> Result<Parts> {
     let arrays = npz::names(path)?;
     let has = |name: &str| arrays.iter().any(|array| array == name);
-    let descriptors: Array2<f32> = npz::read(path, "descriptors")?;
     let wrong = |name: &str, reason: String| Error::format(path, format!("array `{name}`"), reason);
-    let mut parts = Parts { descriptors: Some(Descriptors::new(descriptors)?), ..Parts::default() };
-    if has("positions") {
-        let positions: Array2<f64> = npz::read(path, "positions")?;
+    let (mut parts, mut used) = (Parts::default(), Vec::new());
+    if let Some(rows) = descriptors_in(path, &arrays)? {
+        let (descriptors, stored) = npz::read_f32_rounded(path, &rows)?;
+        parts.descriptors = Some(Descriptors::new(descriptors)?);
+        parts.notes.extend(rounded::note(path, Some(&rows), stored));
+        used.push(rows);
+    }
+    if has(POSITIONS) {
+        let positions: Array2<f64> = npz::read(path, POSITIONS)?;
         let orientations: Option<Array2<f64>> =
-            has("orientations").then(|| npz::read(path, "orientations")).transpose()?;
+            has(ORIENTATIONS).then(|| npz::read(path, ORIENTATIONS)).transpose()?;
         let poses = poses_of(&positions, orientations.as_ref());
         parts.poses = Some(poses.map_err(|(array, reason)| wrong(array, reason))?);
+        used.extend([POSITIONS, ORIENTATIONS].map(str::to_owned));
+    } else if has(ORIENTATIONS) {
+        return Err(wrong(ORIENTATIONS, format!("is there, but no `{POSITIONS}`")));
     }
-    if has("names") && has("name_offsets") {
-        let text: Array1<u8> = npz::read(path, "names")?;
-        let offsets: Array1<i64> = npz::read(path, "name_offsets")?;
-        let names = Names::from_parts(text.to_vec(), &offsets.to_vec());
-        parts.names = Some(names.map_err(|reason| wrong("names", reason))?);
+    match names_array(path, &arrays)? {
+        Some(name) => {
+            parts.names = Some(names_in(path, name, has(OFFSETS))?);
+            used.extend([name, OFFSETS].map(str::to_owned));
+        }
+        None if has(OFFSETS) => {
+            return Err(wrong(OFFSETS, "is there, but no `names`".to_owned()));
+        }
+        None => {}
+    }
+    let unused: Vec<&str> = arrays.iter().filter(|it| !used.contains(it)).map(|it| &**it).collect();
+    if !unused.is_empty() {
+        let unused = shorten(&unused.join(", "));
+        parts.notes.push(format!("{}: arrays that are not used: {unused}", path.display()));
     }
     parts.check()?;
     Ok(parts)
+}
+
+/// The array of descriptors; `None` if there are only positions.
+fn descriptors_in(path: &Path, arrays: &[String]) -> Result<Option<String>> {
+    let has = |name: &str| arrays.iter().any(|array| array == name);
+    if has(DESCRIPTORS) {
+        return Ok(Some(DESCRIPTORS.to_owned()));
+    }
+    let mut matrices = Vec::new();
+    for array in arrays.iter().filter(|it| ![POSITIONS, ORIENTATIONS].contains(&it.as_str())) {
+        let (element, shape) = npz::describe(path, array)?;
+        if shape.len() == 2 && element != "bool" && !TEXTS.contains(&element) {
+            matrices.push(array.clone());
+        }
+    }
+    let known = || shorten(&arrays.join(", "));
+    let reason = match matrices.as_slice() {
+        [one] => return Ok(Some(one.clone())),
+        [] if has(POSITIONS) => return Ok(None),
+        [] => format!("is not there, nor any matrix of numbers; known: {}", known()),
+        _ => format!("is not there, but several matrices are: {}", shorten(&matrices.join(", "))),
+    };
+    Err(Error::format(path, format!("array `{DESCRIPTORS}`"), reason))
+}
+
+/// The array of names: `names`, whatever is in it, or texts under another title.
+fn names_array(path: &Path, arrays: &[String]) -> Result<Option<&'static str>> {
+    for name in NAMES.into_iter().filter(|name| arrays.iter().any(|array| array == name)) {
+        if name == NAMES[0] || TEXTS.contains(&npz::describe(path, name)?.0) {
+            return Ok(Some(name));
+        }
+    }
+    Ok(None)
+}
+
+/// Names as texts, or as one text of bytes with offsets.
+fn names_in(path: &Path, name: &str, has_offsets: bool) -> Result<Names> {
+    let wrong = |reason: String| Error::format(path, format!("array `{name}`"), reason);
+    match (npz::describe(path, name)?.0, has_offsets) {
+        ("uint8", true) => {
+            let text: Array1<u8> = npz::read(path, name)?;
+            let offsets: Array1<i64> = npz::read(path, OFFSETS)?;
+            Names::from_parts(text.to_vec(), &offsets.to_vec()).map_err(wrong)
+        }
+        ("uint8", false) => Err(wrong(format!("has bytes of names, but there is no `{OFFSETS}`"))),
+        (texts, _) if TEXTS.contains(&texts) => {
+            Ok(npz::read_texts(path, name)?.into_iter().collect())
+        }
+        (other, _) => Err(wrong(format!("has {other}, not names"))),
+    }
 }
 
 /// The poses of an `n × 2` or `n × 3` array of positions and an `n × 4` one of quaternions wxyz.
@@ -59,7 +129,8 @@ pub(super) fn poses_of(
         (3, None) => Poses::Spatial(rows.map(|row| Point3::new(row[0], row[1], row[2])).collect()),
         (3, Some(wxyz)) if wxyz.dim() == (positions.nrows(), 4) => {
             let both = rows.zip(wxyz.rows()).enumerate().map(|(index, (xyz, q))| {
-                let pose = OURS.pose([xyz[0], xyz[1], xyz[2]], [q[0], q[1], q[2], q[3]]);
+                let pose =
+                    PoseConvention::TABLE.pose([xyz[0], xyz[1], xyz[2]], [q[0], q[1], q[2], q[3]]);
                 pose.map_err(|reason| ("orientations", format!("row {index}: {reason}")))
             });
             Poses::SixDof(both.collect::<Result<Vec<Isometry3<f64>>, _>>()?)
@@ -81,7 +152,9 @@ pub(super) fn arrays_of(poses: &Poses) -> (Vec<f64>, usize, Option<Vec<f64>>) {
         [position.x, position.y, position.z].into_iter().take(width)
     });
     let orientations = match poses {
-        Poses::SixDof(poses) => Some(poses.iter().flat_map(|pose| OURS.parts(pose).1).collect()),
+        Poses::SixDof(poses) => {
+            Some(poses.iter().flat_map(|pose| PoseConvention::TABLE.parts(pose).1).collect())
+        }
         _ => None,
     };
     (positions.collect(), width, orientations)

@@ -20,6 +20,9 @@ pub struct Parts {
     pub origins: Option<Origins>,
     /// What else is known.
     pub about: About,
+    /// What a person should know of the reading, one line each with the file it is about: what was
+    /// rounded, put into another zone, or not used.
+    pub notes: Vec<String>,
 }
 
 /// References in order of nearness for every query, by name.
@@ -51,6 +54,7 @@ impl Parts {
             poses: map.poses()?,
             origins: map.origins()?,
             about: map.about().clone(),
+            notes: Vec::new(),
         })
     }
 
@@ -72,36 +76,6 @@ impl Parts {
             None => Ok(()),
             Some(&(what, actual)) => Err(Error::Mismatch { what, expected: known[0].1, actual }),
         }
-    }
-
-    /// Takes names and poses from another file of the same images: by name if both have names,
-    /// by order otherwise.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Mismatch`] if the numbers of images differ and there are no names to go by;
-    /// [`Error::Unknown`] if an image has no pose.
-    pub fn join(mut self, other: Self) -> Result<Self> {
-        let about = other.about;
-        self.about.coordinates = self.about.coordinates.or(about.coordinates);
-        let (Some(names), Some(other_names), Some(poses)) =
-            (&self.names, &other.names, &other.poses)
-        else {
-            self.names = self.names.or(other.names);
-            self.poses = other.poses.or(self.poses);
-            self.check()?;
-            return Ok(self);
-        };
-        let row_of: std::collections::HashMap<&str, usize> = other_names.iter().zip(0..).collect();
-        let rows = names.iter().map(|name| {
-            row_of.get(name).copied().ok_or_else(|| {
-                let known = format!("{} images, such as {:?}", row_of.len(), other_names.get(0));
-                Error::Unknown { kind: "pose of image", name: name.to_owned(), known }
-            })
-        });
-        let rows: Vec<usize> = rows.collect::<Result<_>>()?;
-        self.poses = Some(poses.select(&rows));
-        Ok(self)
     }
 
     /// The map of these parts.

@@ -23,6 +23,11 @@ impl<'a> Report<'a> {
         self.problems.push(Error::format(self.path, format!("line {line}"), reason));
     }
 
+    /// Notes a problem in a place of its own.
+    pub(super) fn at(&mut self, place: impl Into<String>, reason: impl Into<String>) {
+        self.problems.push(Error::format(self.path, place, reason));
+    }
+
     /// Notes a problem of the whole file.
     pub(super) fn file(&mut self, reason: impl Into<String>) {
         self.problems.push(Error::format(self.path, "file", reason));
@@ -53,14 +58,25 @@ impl<'a> Report<'a> {
     }
 }
 
-/// The text of a file.
+/// The text of a file, without the mark that some editors put before it.
 pub(super) fn read_text(path: &Path) -> Read<String> {
     let bytes = fs::read(path).map_err(|source| vec![Error::io(path)(source)])?;
-    String::from_utf8(bytes).map_err(|err| {
-        let at = err.utf8_error().valid_up_to();
-        vec![Error::format(path, format!("byte {at}"), "is not UTF-8 text")]
-    })
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Err(vec![Error::format(path, "byte 0", "is UTF-16 text: save it as UTF-8")]);
+    }
+    let mut text = String::from_utf8(bytes).map_err(|err| {
+        let valid = err.utf8_error().valid_up_to();
+        let line = err.as_bytes()[..valid].split(|&byte| byte == b'\n').count();
+        vec![Error::format(path, format!("line {line}"), "is not UTF-8 text")]
+    })?;
+    if text.starts_with(BYTE_ORDER_MARK) {
+        text.drain(..BYTE_ORDER_MARK.len_utf8());
+    }
+    Ok(text)
 }
+
+/// What some editors put before a text.
+pub(super) const BYTE_ORDER_MARK: char = '\u{feff}';
 
 /// The lines of a text that say something, with their numbers: not blank, not after a `#`.
 pub(super) fn content_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {

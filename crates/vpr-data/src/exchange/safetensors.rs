@@ -8,6 +8,7 @@ use super::{
     npz::{arrays_of, poses_of},
     parts::Parts,
     report::Read,
+    rounded,
 };
 use vpr_core::{
     Descriptors, Error, Result,
@@ -17,8 +18,8 @@ use vpr_files::{access, replace, shorten};
 
 const ALIGNMENT: usize = 64;
 
-/// Descriptors are the tensor `descriptors`, or the only matrix of f32, f16 or int8; `scales`,
-/// `positions`, `orientations`, `names` and `name_offsets` are used if they are there.
+/// Descriptors are the tensor `descriptors`, or the only matrix of numbers, if there are any; `scales`, `positions`,
+/// `orientations`, `names` and `name_offsets` are used if they are there.
 pub(super) fn read(path: &Path) -> Read<Parts> {
     read_parts(path).map_err(|err| vec![err])
 }
@@ -29,8 +30,12 @@ fn read_parts(path: &Path) -> Result<Parts> {
     let tensors = Tensors { path, file: &file, header: &header };
     let wrong =
         |name: &str, reason: String| Error::format(path, format!("tensor `{name}`"), reason);
-    let descriptors = tensors.descriptors()?;
-    let mut parts = Parts { descriptors: Some(descriptors), ..Parts::default() };
+    let matrix = tensors.matrix()?;
+    let mut parts = Parts::default();
+    if let Some((rows, entry)) = matrix {
+        parts.descriptors = Some(tensors.descriptors(rows, entry)?);
+        parts.notes.extend(rounded::note(path, Some(rows), element_name(entry.dtype)));
+    }
     parts.about = About::read_from(&header.metadata)
         .map_err(|(place, reason)| Error::format(path, place, reason))?;
     if let Some(positions) = tensors.doubles("positions")? {
@@ -38,16 +43,89 @@ fn read_parts(path: &Path) -> Result<Parts> {
         let poses = poses_of(&positions, orientations.as_ref());
         parts.poses = Some(poses.map_err(|(name, reason)| wrong(name, reason))?);
     }
-    if let (Some(text), Some(offsets)) =
-        (tensors.bytes("names", ElementType::U8)?, tensors.bytes("name_offsets", ElementType::I64)?)
-    {
-        let offsets: Vec<i64> =
-            offsets.as_chunks().0.iter().map(|bytes| i64::from_le_bytes(*bytes)).collect();
-        let names = Names::from_parts(text, &offsets);
-        parts.names = Some(names.map_err(|reason| wrong("names", reason))?);
+    let lone = |there: &str, missing: &str| {
+        Err(wrong(there, format!("is there, but no `{missing}`, without which it says nothing")))
+    };
+    if parts.poses.is_none() && header.tensors.contains_key("orientations") {
+        return lone("orientations", "positions");
+    }
+    match (
+        tensors.bytes("names", ElementType::U8)?,
+        tensors.bytes("name_offsets", ElementType::I64)?,
+    ) {
+        (Some(text), Some(offsets)) => {
+            let offsets: Vec<i64> =
+                offsets.as_chunks().0.iter().map(|bytes| i64::from_le_bytes(*bytes)).collect();
+            let names = Names::from_parts(text, &offsets);
+            parts.names = Some(names.map_err(|reason| wrong("names", reason))?);
+        }
+        (Some(_), None) => return lone("names", "name_offsets"),
+        (None, Some(_)) => return lone("name_offsets", "names"),
+        (None, None) => {}
+    }
+    let rows = matrix.map(|(name, _)| name);
+    let is_used = |name: &&String| Some(*name) == rows || KNOWN.contains(&name.as_str());
+    let unused: Vec<&str> =
+        header.tensors.keys().filter(|name| !is_used(name)).map(String::as_str).collect();
+    if !unused.is_empty() {
+        let unused = shorten(&unused.join(", "));
+        parts.notes.push(format!("{}: tensors that are not used: {unused}", path.display()));
     }
     parts.check()?;
     Ok(parts)
+}
+
+/// The tensors with a meaning, and what maps have besides.
+const KNOWN: [&str; 8] = [
+    "descriptors",
+    "scales",
+    "positions",
+    "orientations",
+    "names",
+    "name_offsets",
+    "padding",
+    "block_digests",
+];
+
+/// `NumPy`'s name of an element type.
+fn element_name(element: ElementType) -> &'static str {
+    match element {
+        ElementType::F64 => "float64",
+        ElementType::F32 => "float32",
+        ElementType::F16 => "float16",
+        ElementType::BF16 => "bfloat16",
+        ElementType::I8 => "int8",
+        ElementType::U8 => "uint8",
+        ElementType::I16 => "int16",
+        ElementType::U16 => "uint16",
+        ElementType::I32 => "int32",
+        ElementType::U32 => "uint32",
+        ElementType::I64 => "int64",
+        ElementType::U64 => "uint64",
+        _ => "another type",
+    }
+}
+
+/// Numbers as f64, which holds all but the largest integers; `None` for a type of no numbers.
+fn numbers(element: ElementType, bytes: &[u8]) -> Option<Vec<f64>> {
+    fn all<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
+        bytes.as_chunks().0.iter().map(|bytes| number(*bytes)).collect()
+    }
+    Some(match element {
+        ElementType::F64 => all(bytes, f64::from_le_bytes),
+        ElementType::F32 => all(bytes, |it| f32::from_le_bytes(it).into()),
+        ElementType::F16 => all(bytes, |it| half::f16::from_le_bytes(it).into()),
+        ElementType::BF16 => all(bytes, |it| half::bf16::from_le_bytes(it).into()),
+        ElementType::I8 => all(bytes, |it| i8::from_le_bytes(it).into()),
+        ElementType::U8 => all(bytes, |it| u8::from_le_bytes(it).into()),
+        ElementType::I16 => all(bytes, |it| i16::from_le_bytes(it).into()),
+        ElementType::U16 => all(bytes, |it| u16::from_le_bytes(it).into()),
+        ElementType::I32 => all(bytes, |it| i32::from_le_bytes(it).into()),
+        ElementType::U32 => all(bytes, |it| u32::from_le_bytes(it).into()),
+        ElementType::I64 => all(bytes, |it| i64::from_le_bytes(it) as f64),
+        ElementType::U64 => all(bytes, |it| u64::from_le_bytes(it) as f64),
+        _ => return None,
+    })
 }
 
 struct Tensors<'a> {
@@ -78,45 +156,68 @@ impl Tensors<'_> {
         self.read(entry).map(Some)
     }
 
+    /// A matrix of f64, if there is one of this name; f32 will do.
     fn doubles(&self, name: &str) -> Result<Option<Array2<f64>>> {
-        let Some(bytes) = self.bytes(name, ElementType::F64)? else { return Ok(None) };
-        let shape = shape_of(&self.header.tensors[name]);
-        let values = bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
-        let array = shape.and_then(|shape| Array2::from_shape_vec(shape, values).ok());
+        let Some(entry) = self.header.tensors.get(name) else { return Ok(None) };
+        if !matches!(entry.dtype, ElementType::F32 | ElementType::F64) {
+            let reason = format!("holds {}, expected float64", element_name(entry.dtype));
+            return Err(self.wrong(name, reason));
+        }
+        let values = numbers(entry.dtype, &self.read(entry)?).unwrap_or_default();
+        let array = shape_of(entry).and_then(|shape| Array2::from_shape_vec(shape, values).ok());
         array.map(Some).ok_or_else(|| self.wrong(name, "is no matrix"))
     }
 
-    fn descriptors(&self) -> Result<Descriptors> {
-        let is_matrix = |entry: &TensorEntry| {
-            entry.shape.len() == 2 && RowType::of_element(entry.dtype).is_some()
+    /// The matrix that descriptors are in; `None` if there are only positions.
+    fn matrix(&self) -> Result<Option<(&String, &TensorEntry)>> {
+        let is_other = |name: &str| KNOWN[1..].contains(&name);
+        let is_matrix = |(name, entry): &(&String, &TensorEntry)| {
+            entry.shape.len() == 2 && entry.dtype != ElementType::Other && !is_other(name)
         };
-        let mut matrices = self.header.tensors.iter().filter(|(_, entry)| is_matrix(entry));
+        let mut matrices = self.header.tensors.iter().filter(is_matrix);
         let named = self.header.tensors.get_key_value("descriptors");
-        let (name, entry) = match (named, matrices.next(), matrices.next()) {
-            (Some(named), ..) | (None, Some(named), None) => named,
-            (None, None, _) => {
-                return Err(self.wrong("descriptors", "is not there, nor any matrix"));
-            }
-            _ => return Err(self.wrong("descriptors", "is not there, but several matrices are")),
-        };
-        let (Some((n, dim)), Some(row_type)) = (shape_of(entry), RowType::of_element(entry.dtype))
-        else {
-            return Err(self.wrong(name, "is no matrix of f32, f16 or int8"));
-        };
+        match (named, matrices.next(), matrices.next()) {
+            (Some(named), ..) | (None, Some(named), None) => Ok(Some(named)),
+            (None, None, _) if self.header.tensors.contains_key("positions") => Ok(None),
+            (None, None, _) => Err(self.wrong("descriptors", "is not there, nor any matrix")),
+            _ => Err(self.wrong("descriptors", "is not there, but several matrices are")),
+        }
+    }
+
+    fn descriptors(&self, name: &str, entry: &TensorEntry) -> Result<Descriptors> {
+        let Some((n, dim)) = shape_of(entry) else { return Err(self.wrong(name, "is no matrix")) };
         if dim == 0 {
             return Err(self.wrong(name, "has rows of length zero"));
         }
+        // Bytes with a factor per row, as our maps have them; without factors they are numbers.
+        let has_scales =
+            entry.dtype == ElementType::I8 && self.header.tensors.contains_key("scales");
+        let row_type =
+            RowType::of_element(entry.dtype).filter(|it| *it != RowType::I8 || has_scales);
+        let Some(row_type) = row_type else {
+            let Some(values) = numbers(entry.dtype, &self.read(entry)?) else {
+                return Err(self.wrong(
+                    name,
+                    "holds no numbers that are read: floats of 16 to 64 \
+                                             bits and integers are",
+                ));
+            };
+            #[expect(clippy::cast_possible_truncation, reason = "rounding is said")]
+            let values = values.into_iter().map(|value| value as f32).collect();
+            let shape = |err: ndarray::ShapeError| self.wrong(name, err.to_string());
+            return Descriptors::new(Array2::from_shape_vec((n, dim), values).map_err(shape)?);
+        };
         let scales = self.bytes("scales", ElementType::F32)?.unwrap_or_default();
         let scales: Vec<f32> =
             scales.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
-        if row_type == RowType::I8 && scales.len() != n {
+        if has_scales && scales.len() != n {
             return Err(self.wrong("scales", format!("has {} scales for {n} rows", scales.len())));
         }
         let bytes = self.read(entry)?;
         let mut values = Array2::zeros((n, dim));
         let stored = bytes.chunks_exact(dim * row_type.size());
         for (row, (bytes, mut values)) in stored.zip(values.rows_mut()).enumerate() {
-            let scale = scales.get(row).copied().unwrap_or(1.0);
+            let scale = if has_scales { scales.get(row).copied().unwrap_or(1.0) } else { 1.0 };
             row_type.decode(bytes, scale, values.as_slice_mut().unwrap_or_default());
         }
         Descriptors::new(values)

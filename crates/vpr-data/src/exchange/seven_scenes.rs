@@ -1,6 +1,6 @@
 //! A 7-Scenes sequence: `frame-XXXXXX.pose.txt`, a 4×4 camera-to-world matrix in metres per frame.
 
-use std::{fmt::Write as _, fs, path::Path};
+use std::{collections::HashMap, ffi::OsString, fmt::Write as _, fs, path::Path};
 
 use super::{
     convention::{pose_from_rows, rows_of_pose},
@@ -16,7 +16,10 @@ const IMAGE: &str = ".color.png";
 /// Frames in the order of their names; an image is called after its frame, `frame-000000.color.png`.
 pub(super) fn read(folder: &Path) -> Read<Parts> {
     let entries = fs::read_dir(folder).map_err(|source| vec![Error::io(folder)(source)])?;
-    let names = entries.flatten().filter_map(|entry| entry.file_name().into_string().ok());
+    let names = entries.map(|entry| entry.map(|entry| entry.file_name()));
+    let names: Vec<OsString> =
+        names.collect::<Result<_, _>>().map_err(|source| vec![Error::io(folder)(source)])?;
+    let names = names.iter().filter_map(|name| name.to_str());
     let mut frames: Vec<String> =
         names.filter_map(|name| name.strip_suffix(POSE).map(str::to_owned)).collect();
     frames.sort();
@@ -49,15 +52,31 @@ fn read_pose(path: &Path) -> Read<Pose> {
     pose_from_rows(top).map_err(wrong)
 }
 
+/// Whether all names are those of frames.
+pub(super) fn are_frames(names: &Names) -> bool {
+    names.iter().all(|name| frame_of(name).is_some())
+}
+
+fn frame_of(name: &str) -> Option<&str> {
+    name.strip_suffix(IMAGE).filter(|name| !name.contains(['/', '\\']))
+}
+
 /// Writes one pose file per image; an image that is not called like a frame gets a number.
 pub(super) fn write(folder: &Path, parts: &Parts) -> Result<()> {
     let poses = parts.six_dof()?;
     fs::create_dir_all(folder).map_err(Error::io(folder))?;
     let frame = |row: usize| {
         let name = parts.name(row);
-        let plain = name.strip_suffix(IMAGE).filter(|name| !name.contains(['/', '\\']));
-        plain.map_or_else(|| format!("frame-{row:06}"), str::to_owned)
+        frame_of(&name).map_or_else(|| format!("frame-{row:06}"), str::to_owned)
     };
+    let mut row_of = HashMap::new();
+    for row in 0..poses.len() {
+        if let Some(first) = row_of.insert(frame(row), row) {
+            let place = format!("name `{}`", vpr_files::shorten(&parts.name(row)));
+            let reason = format!("is the frame of two images, in rows {first} and {row}");
+            return Err(Error::format(folder, place, reason));
+        }
+    }
     for (row, pose) in poses.iter().enumerate() {
         let mut text = String::new();
         for row in rows_of_pose(pose).as_chunks::<4>().0 {

@@ -3,62 +3,64 @@
 use std::{fmt::Write as _, path::Path};
 
 use super::{
+    Reading, held,
     parts::Parts,
     report::{Read, Report, content_lines, read_text},
 };
-use crate::layout::utm_names::{UtmFolder, parse_name};
+use crate::{
+    layout::utm_names::{InNames, UtmFolder, in_one_zone, parse_name},
+    zone::advised,
+};
 use vpr_core::{
-    Poses, Result,
-    map::{About, Coordinates, UtmZone},
+    Error, Poses, Result,
+    map::{About, Coordinates, Names, UtmZone},
 };
 use vpr_files::replace;
 
+/// Names round positions to the centimetre.
+const ROUNDING_M: f64 = 0.02;
+
 /// Reads a folder of images, or a text file with one such name per line.
-pub(super) fn read(path: &Path) -> Read<Parts> {
+pub(super) fn read(path: &Path, reading: Reading) -> Read<Parts> {
     if path.is_dir() {
-        let folder = UtmFolder::open(path).map_err(|err| vec![err])?;
+        let folder = UtmFolder::open_in(path, reading.zone).map_err(|err| vec![err])?;
         let names = folder.images.iter();
         let names = names.map(|image| image.strip_prefix(path).unwrap_or(image).to_string_lossy());
-        let about = about(folder.zones.iter().map(String::as_str));
-        let names = Some(names.collect());
-        return Ok(Parts { names, poses: Some(folder.poses()), about, ..Parts::default() });
+        let (names, poses) = (Some(names.collect()), Some(folder.poses()));
+        let notes = folder.notes;
+        return Ok(Parts { names, poses, about: about(folder.zone), notes, ..Parts::default() });
     }
     let text = read_text(path)?;
     let mut report = Report::new(path);
-    let (mut names, mut positions, mut zones) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut names, mut lines, mut said) = (Names::default(), Vec::new(), Vec::new());
     for (line, name) in content_lines(&text) {
-        if let Some((position, zone)) = report.keep(line, parse_name(Path::new(name))) {
-            if let Some(first) = zones.iter().find(|first: &&String| **first != zone) {
-                report.line(line, format!("zone `{zone}`, but `{first}` before: not comparable"));
-            }
+        if let Some(position) = report.keep(line, parse_name(Path::new(name))) {
             names.push(name);
-            positions.push(position);
-            zones.push(zone);
+            lines.push(line);
+            said.push(position);
         }
     }
-    let about = about(zones.iter().map(String::as_str));
-    let poses = Some(Poses::Planar(positions));
-    report.finish(Parts {
-        names: Some(names.into_iter().collect()),
-        poses,
-        about,
-        ..Parts::default()
-    })
+    let place = |row: usize| format!("line {}", lines[row]);
+    match in_one_zone(&said, reading.zone, path, place).map_err(advised) {
+        Ok(InNames { positions, zone, notes }) => {
+            let (names, poses) = (Some(names), Some(Poses::Planar(positions)));
+            report.finish(Parts { names, poses, about: about(zone), notes, ..Parts::default() })
+        }
+        Err(err) => {
+            report.errors(vec![err]);
+            report.finish(Parts::default())
+        }
+    }
 }
 
-/// The zone of names such as `10S`, where the letter is a latitude band: N and above lie north.
-fn about<'z>(mut zones: impl Iterator<Item = &'z str>) -> About {
-    let zone = zones.next().and_then(|zone| {
-        let letter = zone.chars().last().filter(char::is_ascii_uppercase)?;
-        let number = zone.strip_suffix(letter)?.parse().ok()?;
-        (1..=60).contains(&number).then_some(UtmZone { number, south: letter < 'N' })
-    });
+fn about(zone: Option<UtmZone>) -> About {
     About { coordinates: zone.map(Coordinates::Utm), ..About::default() }
 }
 
 /// Writes one name per line: `@east@north@zone@band@@@name@…@.jpg`, the old name as the panorama's.
 ///
-/// The band is `N` or `M`, the first on either side of the equator: maps keep no latitude band.
+/// A name that says this position already stays as it is. The band is `N` or `M`, the first on either
+/// side of the equator: maps keep no latitude band.
 pub(super) fn write(path: &Path, parts: &Parts) -> Result<()> {
     let (number, band) = match parts.about.coordinates {
         Some(Coordinates::Utm(zone)) => {
@@ -70,8 +72,14 @@ pub(super) fn write(path: &Path, parts: &Parts) -> Result<()> {
     for (row, position) in parts.poses()?.planar()?.iter().enumerate() {
         let name = parts.name(row);
         let (x, y) = (position.x, position.y);
-        if name.contains('@') {
+        held::Names::Line.check(path, &name)?;
+        let own = parse_name(Path::new(&name)).ok();
+        if own.is_some_and(|own| (own.position - position).norm() < ROUNDING_M) {
             let _ = writeln!(text, "{name}");
+        } else if name.contains('@') {
+            let place = format!("name `{}`", vpr_files::shorten(&name));
+            let reason = "has an `@`, which ends a field in this format, and not this position";
+            return Err(Error::format(path, place, reason));
         } else {
             let stem = name.rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem);
             let stem = stem.replace(['/', '\\'], "_");

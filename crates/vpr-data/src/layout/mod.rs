@@ -1,5 +1,6 @@
 //! One file per on-disk layout, read as the originals are.
 
+pub mod folder;
 pub mod npz_images;
 pub mod numbered;
 pub mod pose_csv;

@@ -2,33 +2,36 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{utm_names::images_below, vpr_bench::image_number};
-use vpr_core::{Error, Result};
+use super::{
+    folder::{Listing, images_of},
+    vpr_bench::image_number,
+};
+use vpr_core::Result;
 
-/// The images below a folder, as deep as they lie: in the order of the integers that they are named
-/// by, if all lie in the folder itself and each has its own; else in the order of their paths. Other
-/// files are ignored.
+/// The images of a folder, see [`images_of`]: in the order of the integers that they are named by,
+/// if all lie in the folder itself and each has its own; else in the order of their paths.
 ///
 /// # Errors
 ///
-/// [`Error::Io`] if a folder cannot be read; [`Error::Format`] if there is no image.
-pub fn images_in_order(folder: &Path) -> Result<Vec<PathBuf>> {
-    let images = images_below(folder)?;
-    if images.is_empty() {
-        return Err(Error::format(folder, "folder", "has no image"));
-    }
+/// Those of [`images_of`].
+pub fn images_in_order(folder: &Path) -> Result<Listing> {
+    let Listing { images, notes } = images_of(folder)?;
+    Ok(Listing { images: in_order(folder, images), notes })
+}
+
+fn in_order(folder: &Path, images: Vec<PathBuf>) -> Vec<PathBuf> {
     let number = |path: &PathBuf| {
         let is_direct = path.parent() == Some(folder);
         image_number(path).ok().filter(|_| is_direct).map(|number| (number, path.clone()))
     };
     let Some(mut numbered) = images.iter().map(number).collect::<Option<Vec<_>>>() else {
-        return Ok(images);
+        return images;
     };
     numbered.sort();
     if numbered.windows(2).any(|pair| pair[0].0 == pair[1].0) {
-        return Ok(images);
+        return images;
     }
-    Ok(numbered.into_iter().map(|(_, path)| path).collect())
+    numbered.into_iter().map(|(_, path)| path).collect()
 }
 
 #[cfg(test)]
@@ -47,7 +50,8 @@ mod tests {
             let name = |path: PathBuf| {
                 path.strip_prefix(folder.path()).unwrap().to_string_lossy().into_owned()
             };
-            images_in_order(folder.path()).map(|it| it.into_iter().map(name).collect::<Vec<_>>())
+            let listing = images_in_order(folder.path());
+            listing.map(|it| it.images.into_iter().map(name).collect::<Vec<_>>())
         };
         assert_eq!(order(&["10.jpg", "9.png", "notes.txt"]).unwrap(), ["9.png", "10.jpg"]);
         assert_eq!(order(&["10.jpg", "9.jpg", "a.jpg"]).unwrap(), ["10.jpg", "9.jpg", "a.jpg"]);

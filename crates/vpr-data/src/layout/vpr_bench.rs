@@ -3,10 +3,9 @@
 mod images;
 mod invariance;
 mod matches;
-mod truth;
 
+pub use crate::truth::GroundTruthFile;
 pub use images::image_folder;
 pub(crate) use images::{image_number, is_image};
 pub use invariance::{read_areas, read_curves};
 pub use matches::PublishedMatches;
-pub use truth::GroundTruthFile;

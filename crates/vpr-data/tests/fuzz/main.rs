@@ -13,6 +13,10 @@
 
 mod mutate;
 mod targets;
+#[path = "../truth/files.rs"]
+#[allow(dead_code, reason = "only the files are needed here")]
+mod truth_files;
+mod truths;
 
 use std::{
     fs::{self, File},
@@ -141,7 +145,12 @@ fn fuzz(target: &Target, rounds: usize) -> Result<(usize, usize), String> {
             Ok(outcome) => outcome,
             Err(reason) => return failed(&input, reason),
         };
-        if target.notices_all && round % 4 < 2 && !noticed && input != *seed {
+        let must_notice = match round % 4 {
+            0 => target.notices_cuts,
+            1 => target.notices_all,
+            _ => false,
+        };
+        if must_notice && !noticed && input != *seed {
             return failed(&input, "damage went unnoticed".to_owned());
         }
         n_refused += usize::from(noticed);
@@ -156,7 +165,8 @@ fn damaged_files_are_refused_in_one_line_and_in_little_memory() {
     let rounds = rounds.unwrap_or(ROUNDS);
     // A panic is counted, not printed thousands of times.
     panic::set_hook(Box::new(|_| {}));
-    let outcomes: Vec<_> = TARGETS.iter().map(|target| (target, fuzz(target, rounds))).collect();
+    let all = TARGETS.iter().chain(truths::TARGETS);
+    let outcomes: Vec<_> = all.map(|target| (target, fuzz(target, rounds))).collect();
     let _ = panic::take_hook();
     let mut failures = Vec::new();
     for (target, outcome) in outcomes {
@@ -176,4 +186,5 @@ fn damaged_files_are_refused_in_one_line_and_in_little_memory() {
 #[ignore = "writes into the source tree"]
 fn write_the_seeds() {
     targets::write_seeds(&corpus());
+    truths::write_seeds(&corpus());
 }

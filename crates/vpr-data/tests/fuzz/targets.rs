@@ -31,6 +31,8 @@ pub(crate) struct Target {
     pub(crate) read: fn(&Path) -> Vec<Error>,
     /// Whether no truncation and no flipped bit may go unnoticed.
     pub(crate) notices_all: bool,
+    /// Whether no truncation may go unnoticed, since the format says how long a file is.
+    pub(crate) notices_cuts: bool,
 }
 
 /// A target that reads the file `file` of a format.
@@ -41,6 +43,7 @@ macro_rules! file_target {
             file: $file,
             read: |folder| exchange::problems($format, &folder.join($file)),
             notices_all: false,
+            notices_cuts: false,
         }
     };
 }
@@ -53,6 +56,7 @@ macro_rules! read_target {
             file: $file,
             read: |folder| ($read)(&folder.join($file)).err().into_iter().collect(),
             notices_all: false,
+            notices_cuts: false,
         }
     };
 }
@@ -65,6 +69,7 @@ macro_rules! folder_target {
             file: $file,
             read: |folder| exchange::problems($format, folder),
             notices_all: false,
+            notices_cuts: false,
         }
     };
 }
@@ -82,15 +87,20 @@ pub(crate) const TARGETS: &[Target] = &[
             problems
         },
         notices_all: true,
+        notices_cuts: true,
     },
     Target {
         name: "manifest",
         file: "manifest.json",
         read: |folder| exchange::problems(Format::Map, folder),
         notices_all: false,
+        notices_cuts: false,
     },
-    file_target!("safetensors", "a.safetensors", Format::Safetensors),
-    file_target!("npz", "a.npz", Format::Npz),
+    Target {
+        notices_cuts: true,
+        ..file_target!("safetensors", "a.safetensors", Format::Safetensors)
+    },
+    Target { notices_cuts: true, ..file_target!("npz", "a.npz", Format::Npz) },
     file_target!("hloc-h5", "a.h5", Format::HlocH5),
     file_target!("hloc-pairs", "a.txt", Format::HlocPairs),
     file_target!("hloc-poses", "a.txt", Format::HlocPoses),
@@ -101,14 +111,34 @@ pub(crate) const TARGETS: &[Target] = &[
     file_target!("utm-names", "a.txt", Format::UtmNames),
     folder_target!("7scenes", "frame-000000.pose.txt", Format::SevenScenes),
     folder_target!("kapture-trajectories", "sensors/trajectories.txt", Format::Kapture),
-    folder_target!("vpr-eval", "database_descriptors.npy", Format::VprEval),
+    Target {
+        name: "kapture-rigs",
+        file: "sensors/rigs.txt",
+        read: |folder| beside_trajectories(folder),
+        notices_all: false,
+        notices_cuts: false,
+    },
+    Target {
+        name: "kapture-records",
+        file: "sensors/records_camera.txt",
+        read: |folder| beside_trajectories(folder),
+        notices_all: false,
+        notices_cuts: false,
+    },
+    file_target!("colmap-text", "images.txt", Format::Colmap),
+    Target { notices_cuts: true, ..file_target!("colmap-binary", "images.bin", Format::Colmap) },
+    Target {
+        notices_cuts: true,
+        ..folder_target!("vpr-eval", "database_descriptors.npy", Format::VprEval)
+    },
     Target {
         name: "vpr-eval-preds",
         file: "preds/000.txt",
         read: |folder| exchange::read_pairs(Format::VprEval, folder).err().into_iter().collect(),
         notices_all: false,
+        notices_cuts: false,
     },
-    file_target!("npy", "a.npy", Format::Npy),
+    Target { notices_cuts: true, ..file_target!("npy", "a.npy", Format::Npy) },
     read_target!("pca", "a.json", Pca::open),
     read_target!("dataset-manifest", "a.toml", Manifest::read),
     read_target!("pose-table", "a.csv", PoseTable::read),
@@ -125,6 +155,7 @@ pub(crate) const TARGETS: &[Target] = &[
             npy::read_objects(&folder.join("a.npy")).err().map(Into::into).into_iter().collect()
         },
         notices_all: false,
+        notices_cuts: false,
     },
     Target {
         name: "pickle",
@@ -133,8 +164,87 @@ pub(crate) const TARGETS: &[Target] = &[
             pickle::read(&folder.join("a.pickle")).err().map(Into::into).into_iter().collect()
         },
         notices_all: false,
+        notices_cuts: false,
     },
 ];
+
+/// What kapture's other files say of a trajectory of two rigs.
+fn beside_trajectories(folder: &Path) -> Vec<Error> {
+    let trajectories = "0, rig, 1, 0, 0, 0, 1, 2, 3\n1, car, 0.6, 0, 0, 0.8, 1, 2, 3\n";
+    fs::write(folder.join("sensors/trajectories.txt"), trajectories).unwrap();
+    exchange::problems(Format::Kapture, folder)
+}
+
+/// Texts as other programs write them, by target and name.
+const TEXTS: [(&str, &str, &str); 9] = [
+    (
+        "kapture-rigs",
+        "sound",
+        "# rig_id, sensor_id, qw, qx, qy, qz, tx, ty, tz\nrig, cam, 1, 0, 0, 0, 0, 0, -0.5\n\
+         car, rig, 0.6, 0, 0.8, 0, 1, 0, 0\ncar, lidar, , , , , , ,\n",
+    ),
+    ("kapture-records", "sound", "0, rig, a.jpg\n1, car, b.jpg\n2, car, c.jpg\n"),
+    (
+        "colmap-text",
+        "sound-points",
+        "# two images\n1 0.6 0 0 0.8 -1 2.5 3 1 db/a b.jpg\n10.5 20.25 -1 3 4 17\n\
+         2 1 0 0 0 0 0 1 1 b.jpg\n\n",
+    ),
+    (
+        "csv",
+        "sound-euroc",
+        "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], \
+         q_RS_z [], v_RS_R_x [m s^-1]\n1403636580838555648,4.6,-1.8,0.8,0.6,0,0,0.8,0.1\n\
+         1403636580843555584,4.7,-1.8,0.9,0,0.6,0.8,0,0.1\n",
+    ),
+    (
+        "csv",
+        "sound-mapillary",
+        ",key,easting,northing,unique_cluster,night\r\n0,aaa-1,349000.5,6173000.25,1,False\r\n\
+         1,bbb_2,349010.5,6173001.25,1,False\r\n",
+    ),
+    (
+        "csv",
+        "sound-semicolons",
+        "\u{feff}# of a survey\nZone;Y;X;Image\n18T;4427750;480000;\"a; \"\"b\"\".jpg\"\n\
+         18T;4427760;480000;c.jpg\n",
+    ),
+    ("csv", "sound-blanks", "# timestamp tx ty tz\n1.5 1 2 3\n# 2.5 1 2 3\n3.5\t4 5 6\n"),
+    ("latlon", "sound-titles", "Longitude\tLatitude\tFilename\n4.3571\t52.0116\ta.jpg\n"),
+    (
+        "utm-names",
+        "sound-bands",
+        "@0480000.00@4427750.00@18@S@@@0@@@@@@@@.jpg\n@0480000.00@4427760.00@18@T@@@1@@@@@@@@.jpg\n",
+    ),
+];
+
+/// A `.npy` file of these bytes.
+fn array(descr: &str, shape: &str, body: &[u8]) -> Vec<u8> {
+    let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n");
+    let length = u16::try_from(header.len()).unwrap().to_le_bytes();
+    [b"\x93NUMPY\x01\x00", length.as_slice(), header.as_bytes(), body].concat()
+}
+
+/// What other programs write: texts, numbers of other types, and names as texts.
+fn write_foreign_seeds(seed: &dyn Fn(&str, &str, &[u8])) {
+    for (target, name, text) in TEXTS {
+        seed(target, name, text.as_bytes());
+    }
+    let doubles: Vec<u8> = (0..6).flat_map(|it| (f64::from(it) * 0.1).to_le_bytes()).collect();
+    seed("npy", "sound-f64", &array("<f8", "(3, 2)", &doubles));
+    let halves: Vec<u8> = (0..6_u16).flat_map(|it| (0x3c00 + it).to_le_bytes()).collect();
+    seed("npy", "sound-f16", &array(">f2", "(2, 3)", &halves));
+    let mut archive = npy::npz::Writer::new(std::io::Cursor::new(Vec::new()));
+    let bytes = |body: &[u8]| body.iter().map(|&byte| [byte]).collect::<Vec<_>>().into_iter();
+    archive.add("descriptors", "<f2", &[2, 3], bytes(&halves)).unwrap();
+    let names = "a.jpgé.jpg".chars().flat_map(|it| u32::from(it).to_le_bytes()).collect::<Vec<_>>();
+    archive.add("names", "<U5", &[2], bytes(&names)).unwrap();
+    archive.add("labels", "|S1", &[2], bytes(b"ab")).unwrap();
+    seed("npz", "sound-texts", &archive.finish().unwrap().into_inner());
+    let header = r#"{"x":{"dtype":"BF16","shape":[3,2],"data_offsets":[0,12]}}"#;
+    let length = (header.len() as u64).to_le_bytes();
+    seed("safetensors", "sound-bf16", &[&length, header.as_bytes(), &halves].concat());
+}
 
 fn parts(n: usize) -> Parts {
     let pose = |row: usize| {
@@ -161,6 +271,19 @@ fn pca(folder: &Path) -> PathBuf {
     path
 }
 
+/// Writes what holds references per query.
+fn write_pair_seeds(folder: &Path, seed: &dyn Fn(&str, &str, &Path)) {
+    let list = |query: &str| PairList {
+        query: query.to_owned(),
+        references: vec!["db/1.jpg".to_owned(), "db/2.jpg".to_owned()],
+    };
+    let pairs = Pairs { lists: vec![list("q/1.jpg"), list("q/2.jpg")] };
+    exchange::write_pairs(Format::VprEval, &folder.join("eval"), &pairs).unwrap();
+    seed("vpr-eval-preds", "sound", &folder.join("eval/preds/000.txt"));
+    exchange::write_pairs(Format::HlocPairs, &folder.join("pairs"), &pairs).unwrap();
+    seed("hloc-pairs", "sound", &folder.join("pairs"));
+}
+
 /// Writes one sound file of every format, and keeps what is there already.
 pub(crate) fn write_seeds(corpus: &Path) {
     let folder = tempfile::tempdir().unwrap();
@@ -169,6 +292,11 @@ pub(crate) fn write_seeds(corpus: &Path) {
         fs::create_dir_all(&place).unwrap();
         fs::copy(file, place.join(name)).unwrap();
     };
+    write_foreign_seeds(&|target, name, bytes| {
+        let path = folder.path().join("bytes");
+        fs::write(&path, bytes).unwrap();
+        seed(target, name, &path);
+    });
     let six_dof = parts(3);
     for (target, format, row_type) in [
         ("safetensors", Format::Safetensors, None),
@@ -191,6 +319,10 @@ pub(crate) fn write_seeds(corpus: &Path) {
         }
         seed(target, &name, &path);
     }
+    for (target, file) in [("colmap-text", "images.txt"), ("colmap-binary", "images.bin")] {
+        exchange::write(Format::Colmap, &folder.path().join(file), &six_dof).unwrap();
+        seed(target, "sound", &folder.path().join(file));
+    }
     seed("pca", "sound", &pca(folder.path()));
     let place = |name: &str| folder.path().join(name);
     exchange::write(Format::SevenScenes, &place("scene"), &parts(1)).unwrap();
@@ -199,15 +331,7 @@ pub(crate) fn write_seeds(corpus: &Path) {
     seed("kapture-trajectories", "sound", &place("kapture/sensors/trajectories.txt"));
     exchange::write(Format::VprEval, &place("eval"), &six_dof).unwrap();
     seed("vpr-eval", "sound", &place("eval/database_descriptors.npy"));
-    let list = |query: &str| PairList {
-        query: query.to_owned(),
-        references: vec!["db/1.jpg".to_owned(), "db/2.jpg".to_owned()],
-    };
-    let pairs = Pairs { lists: vec![list("q/1.jpg"), list("q/2.jpg")] };
-    exchange::write_pairs(Format::VprEval, &place("eval"), &pairs).unwrap();
-    seed("vpr-eval-preds", "sound", &place("eval/preds/000.txt"));
-    exchange::write_pairs(Format::HlocPairs, &place("pairs"), &pairs).unwrap();
-    seed("hloc-pairs", "sound", &place("pairs"));
+    write_pair_seeds(folder.path(), &seed);
     let zone = UtmZone { number: 32, south: false };
     let planar = vec![PlanarPosition::new(593_139.5, 5_763_197.8); 3];
     let about = About { coordinates: Some(Coordinates::Utm(zone)), ..About::default() };

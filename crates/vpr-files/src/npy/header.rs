@@ -130,6 +130,12 @@ impl<'a> Literal<'a> {
         }
         let descr = self.string()?;
         Dtype::parse(descr).ok_or_else(|| {
+            // Bytes without a meaning: what NumPy writes for types that it does not know.
+            if matches!(descr, "|V2" | "<V2") {
+                return "dtype `|V2` says of two bytes not what they are; if bfloat16, save it as \
+                        float32"
+                    .to_owned();
+            }
             let shown: String = descr.chars().take(40).collect();
             format!("dtype `{}` is not read", shown.escape_debug())
         })

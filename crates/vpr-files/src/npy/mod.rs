@@ -4,6 +4,7 @@
 //! not an allocation. Either byte order and either memory order is read; arrays come back in C
 //! order. Object arrays go through [`crate::pickle`], archives of arrays through [`npz`].
 
+mod any;
 mod header;
 pub mod npz;
 mod read;
@@ -13,6 +14,7 @@ use std::path::Path;
 
 use ndarray::{Array, Array1, Array2, ArrayView2, Dimension};
 
+pub use any::read_value;
 pub use read::Element;
 
 use crate::{
@@ -28,29 +30,36 @@ pub(crate) use header::Header;
 /// [`Error::Io`], or [`Error::Format`] if the header does not match the length of the file, the
 /// type is none that [`Element`] says, or the number of dimensions is not that of `D`.
 pub fn read<T: Element, D: Dimension>(path: &Path) -> Result<Array<T, D>> {
-    read::with_dimensions(read::read_file(path)?).map_err(|reason| at(path, 0, reason))
+    read::with_dimensions(read::read_file(path)?.0).map_err(|reason| at(path, 0, reason))
 }
 
-/// Reads a matrix of `float32`, as descriptors are stored.
+/// Reads a matrix of `float32` or `float16`, as descriptors are stored.
 ///
 /// # Errors
 ///
-/// As for [`read()`]; `float64` is refused, see [`read_f32_narrowed`].
+/// As for [`read()`]; wider types are refused, see [`read_f32_rounded`].
 pub fn read_f32(path: &Path) -> Result<Array2<f32>> {
     read(path)
 }
 
-/// Reads a matrix of `float32` or `float64`, rounding the latter to f32.
+/// Reads a matrix of any numbers, rounded to f32, and says which type they have in the file, by
+/// `NumPy`'s name, such as `float64`.
 ///
 /// # Errors
 ///
 /// As for [`read()`].
-pub fn read_f32_narrowed(path: &Path) -> Result<Array2<f32>> {
-    #[expect(clippy::cast_possible_truncation, reason = "narrowing is what the name says")]
-    Ok(read::<f64, _>(path)?.mapv(|value| value as f32))
+pub fn read_f32_rounded(path: &Path) -> Result<(Array2<f32>, &'static str)> {
+    let (values, stored) = read::read_file(path)?;
+    let values = read::with_dimensions(values).map_err(|reason| at(path, 0, reason))?;
+    Ok((unwrapped(values), stored))
 }
 
-/// Reads a matrix of `float64` or `float32`.
+/// The numbers that were rounded, in the memory they have.
+fn unwrapped(values: Array2<read::Rounded>) -> Array2<f32> {
+    values.mapv_into_any(|read::Rounded(value)| value)
+}
+
+/// Reads a matrix of any numbers that f64 holds.
 ///
 /// # Errors
 ///
@@ -103,21 +112,25 @@ pub fn write_i64(path: &Path, values: &[i64]) -> Result<()> {
 /// [`crate::pickle`].
 pub fn read_objects(path: &Path) -> Result<(Vec<usize>, Vec<Value>)> {
     let bytes = std::fs::read(path).map_err(Error::io(path))?;
-    let header = Header::parse(&bytes).map_err(|(offset, reason)| at(path, offset, reason))?;
+    objects(&bytes).map_err(|(offset, reason)| at(path, offset, reason))
+}
+
+/// The shape and the objects of a whole `.npy` file, or where and why there are none.
+fn objects(bytes: &[u8]) -> Result<(Vec<usize>, Vec<Value>), (usize, String)> {
+    let header = Header::parse(bytes)?;
     if header.dtype.kind != crate::dtype::Kind::Object {
-        let name = header.dtype.kind.name();
-        return Err(at(path, 0, format!("holds {name}, not objects")));
+        return Err((0, format!("holds {}, not objects", header.dtype.kind.name())));
     }
-    let refused = |refusal: pickle::Refusal| refusal.in_file(path, header.len);
+    let refused = |refusal: pickle::Refusal| (header.len + refusal.offset, refusal.reason);
     match pickle::decode(&bytes[header.len..]).map_err(refused)? {
         Value::Array { shape, elements: Elements::Object(values) } if shape == header.shape => {
             Ok((shape, values))
         }
         Value::Array { shape, .. } => {
             let reason = format!("the header says {:?}, the pickle holds {shape:?}", header.shape);
-            Err(at(path, header.len, reason))
+            Err((header.len, reason))
         }
-        other => Err(at(path, header.len, format!("the pickle holds {}", other.kind()))),
+        other => Err((header.len, format!("the pickle holds {}", other.kind()))),
     }
 }
 

@@ -120,7 +120,8 @@ fn encode<'a>(arena: &mut Arena<'a>, text: Node<'a>, at: usize) -> Result<Node<'
 /// The dtype called `name`, in native (little-endian) order until it is built.
 fn named_dtype<'a>(arena: &Arena<'a>, name: Node<'a>) -> Result<Dtype, Reason> {
     let name = arena.text(name).ok_or("the name of a dtype is not a string")?;
-    Dtype::parse(name).ok_or_else(|| {
+    let is_text = |dtype: &Dtype| matches!(dtype.kind, Kind::Text(_) | Kind::Bytes(_));
+    Dtype::parse(name).filter(|dtype| !is_text(dtype)).ok_or_else(|| {
         let shown: String = name.chars().take(40).collect();
         format!("dtype `{}` is not read", shown.escape_debug())
     })

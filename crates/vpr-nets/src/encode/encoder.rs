@@ -37,6 +37,11 @@ pub trait Encoder: Send + Sync {
         None
     }
 
+    /// What the keys of its weights began with more than those of the network; `None` if nothing.
+    fn weights_prefix(&self) -> Option<&str> {
+        None
+    }
+
     /// Where it computes.
     fn device(&self) -> Device {
         Device::flex()

@@ -11,6 +11,7 @@ mod network;
 mod preprocessing;
 pub mod registry;
 mod run;
+mod stamps;
 mod to_map;
 
 pub use batches::{BatchLeak, batch_leak};

@@ -9,6 +9,7 @@ use burn::{
     store::ModuleSnapshot,
     tensor::{Device, Tensor, module::adaptive_avg_pool2d},
 };
+use vpr_core::Error;
 
 use super::{
     Encoder, Preprocessing, Size,
@@ -22,7 +23,7 @@ use crate::{
         self, Model,
         default::{DefaultEncoder, DefaultEncoderConfig},
     },
-    weights::Weights,
+    weights::{self, Fitted, Weights},
 };
 
 /// Which encoder is wanted; everything but the name may be left to the registry.
@@ -42,6 +43,9 @@ pub struct Request {
     pub roots: Vec<PathBuf>,
 }
 
+/// Length of NetVLAD's descriptors behind its whitening.
+const WHITENED: usize = 4096;
+
 type Forward = Box<dyn Fn(Tensor<4>) -> Tensor<2> + Send + Sync>;
 type Accepts = Box<dyn Fn(usize, usize) -> Result<(), String> + Send + Sync>;
 
@@ -52,6 +56,7 @@ pub struct Network {
     preprocessing: Preprocessing,
     batch_dependent: bool,
     digest: Option<String>,
+    prefix: Option<String>,
     device: Device,
     forward: Forward,
     accepts: Accepts,
@@ -95,6 +100,10 @@ impl Encoder for Network {
         self.digest.as_deref()
     }
 
+    fn weights_prefix(&self) -> Option<&str> {
+        self.prefix.as_deref()
+    }
+
     fn device(&self) -> Device {
         self.device.clone()
     }
@@ -104,8 +113,8 @@ impl Encoder for Network {
 ///
 /// # Errors
 ///
-/// [`vpr_core::Error::Unknown`] if there is none of this name; where its weights are from, if they
-/// are not at hand; those of [`Weights::open`] and [`Weights::apply`].
+/// [`Error::Unknown`] if there is none of this name; where its weights are from, if they
+/// are not at hand; those of [`Weights::open`] and [`weights::fit`].
 pub fn by_name(name: &str, weights: Option<&Path>, roots: &[PathBuf]) -> Result<Box<dyn Encoder>> {
     by_request(&Request {
         name: name.to_owned(),
@@ -119,46 +128,71 @@ pub fn by_name(name: &str, weights: Option<&Path>, roots: &[PathBuf]) -> Result<
 ///
 /// # Errors
 ///
-/// As [`by_name`].
+/// As [`by_name`]; [`Error::Parameter`] if the weights give descriptors of another length than was
+/// asked for.
 pub fn by_request(request: &Request) -> Result<Box<dyn Encoder>> {
     let method = Method::find(&request.name, request.backbone.as_deref())?;
     let dimension = method.dimension(request.dimension)?;
-    let weights = method.weights(request.weights.as_deref(), dimension, &request.roots)?;
     let device = Device::flex();
     let mut preprocessing = method.preprocessing();
     preprocessing.size = request.size.unwrap_or(preprocessing.size);
-    let network = match method.architecture {
-        Architecture::Default => {
-            let network = DefaultEncoderConfig::new().init(&device);
-            assembled(network, weights, &[], DefaultEncoder::forward)?
-        }
-        Architecture::NetVladMobileNetV2 => {
-            let network = NetVladMobile::new(preprocessing.n_channels(), &device);
-            let weights = NetVladMobile::keys(weights)?;
-            assembled(network, weights, &[], NetVladMobile::forward)?
-        }
-        Architecture::EfficientNetLite0 => efficientnet_lite0(weights, &device)?,
-        Architecture::BoqDinov2 => published(model::boq_dinov2(weights, &device)?),
-        Architecture::BoqResnet50 => published(model::boq_resnet50(weights, &device)?),
-        Architecture::Salad => published(model::salad(weights, &device)?),
-        Architecture::MixVpr => published(model::mixvpr(weights, &device)?),
-        Architecture::CosPlace | Architecture::EigenPlaces => {
-            published(model::cosplace(weights, &device)?)
-        }
-        Architecture::NetVlad => published(model::netvlad(weights, &device)?),
-        Architecture::CricaVpr => published(model::cricavpr(weights, &device)?),
-        Architecture::GemResNet50 => published(model::gem_resnet50(weights, &device)?),
-    };
+    let open = || method.weights(request.weights.as_deref(), dimension, &request.roots);
+    let n_channels = preprocessing.n_channels();
+    let build = |weights: Weights| ready(&method, dimension, n_channels, weights, &device);
+    let Fitted { value: network, prefix } = weights::fit(open, build)?;
+    let actual = network.dimension.unwrap_or(dimension);
+    if request.dimension.is_some_and(|asked| asked != actual) {
+        let name = "descriptors-dimension";
+        let reason = "the weights give descriptors of another length";
+        return Err(Error::Parameter { name, value: dimension.to_string(), reason }.into());
+    }
     Ok(Box::new(Network {
         name: method.name.clone(),
-        dimension: network.dimension.unwrap_or(dimension),
+        dimension: actual,
         preprocessing,
         batch_dependent: method.architecture == Architecture::CricaVpr,
         digest: Some(format!("sha256:{}", network.digest)),
+        prefix,
         device,
         forward: network.forward,
         accepts: network.accepts,
     }))
+}
+
+/// The network of a method with weights whose keys are those that it was published with.
+fn ready(
+    method: &Method,
+    dimension: usize,
+    n_channels: usize,
+    weights: Weights,
+    device: &Device,
+) -> Result<Ready> {
+    Ok(match method.architecture {
+        Architecture::Default => {
+            let network = DefaultEncoderConfig::new().init(device);
+            assembled(network, weights, &[], DefaultEncoder::forward)?
+        }
+        Architecture::NetVladMobileNetV2 => {
+            let network = NetVladMobile::new(n_channels, device);
+            let weights = NetVladMobile::keys(weights)?;
+            assembled(network, weights, &[], NetVladMobile::forward)?
+        }
+        Architecture::EfficientNetLite0 => efficientnet_lite0(weights, device)?,
+        Architecture::BoqDinov2 => published(model::boq_dinov2(weights, device)?),
+        Architecture::BoqResnet50 => published(model::boq_resnet50(weights, device)?),
+        Architecture::Salad => published(model::salad(weights, device)?),
+        Architecture::MixVpr => published(model::mixvpr(weights, device)?),
+        Architecture::CosPlace | Architecture::EigenPlaces => {
+            published(model::cosplace(weights, device)?)
+        }
+        Architecture::NetVlad if dimension > WHITENED => {
+            let weights = weights.renamed(&[(r"^whiten\..*", "")])?;
+            published(model::netvlad(weights, device)?)
+        }
+        Architecture::NetVlad => published(model::netvlad(weights, device)?),
+        Architecture::CricaVpr => published(model::cricavpr(weights, device)?),
+        Architecture::GemResNet50 => published(model::gem_resnet50(weights, device)?),
+    })
 }
 
 /// A module with these weights, and its forward pass as an encoder's.

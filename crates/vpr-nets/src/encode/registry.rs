@@ -45,7 +45,8 @@ pub struct Method {
     /// Its backbone, as VPR-methods-evaluation writes it; empty if it has no choice.
     #[serde(default)]
     pub backbone: String,
-    /// Lengths of the descriptor there are files for, the usual one first.
+    /// Lengths of the descriptor there are files for; the first is taken if none is asked for, as
+    /// VPR-methods-evaluation does.
     pub dimensions: Vec<usize>,
     file: String,
     origin: String,
@@ -247,8 +248,19 @@ impl Method {
         }
         let place = self.locate(dimension, roots).ok_or_else(|| {
             let searched: Vec<_> = roots.iter().map(|it| it.display().to_string()).collect();
+            let others = self
+                .dimensions
+                .iter()
+                .filter(|&&it| it != dimension && self.file(it) != self.file(dimension));
+            let at_hand = others.filter(|&&it| self.locate(it, roots).is_some());
+            let at_hand: Vec<_> = at_hand.map(ToString::to_string).collect();
+            let hint = if at_hand.is_empty() {
+                String::new()
+            } else {
+                format!("; at hand for `--descriptors-dimension` {}", at_hand.join(", "))
+            };
             let reason = format!(
-                "not in weights/ or models/ of {}; it is from {}",
+                "not in weights/ or models/ of {}; it is from {}{hint}",
                 searched.join(", "),
                 self.origin(dimension)
             );
@@ -310,6 +322,44 @@ mod tests {
         assert_eq!(small.name, "cosplace-resnet18");
         assert_eq!(small.file(512), "ResNet18_512_cosplace.pth");
         assert_eq!(Method::find("boq", Some("Dinov2")).unwrap().name, "boq-dinov2");
+    }
+
+    /// `parser.py` of VPR-methods-evaluation, April 2026.
+    #[test]
+    fn lengths_are_those_of_the_tool_whose_flags_are_promised() {
+        let lengths = [
+            ("cosplace", "ResNet50", 2048),
+            ("cosplace", "ResNet101", 2048),
+            ("cosplace", "ResNet18", 512),
+            ("cosplace", "VGG16", 512),
+            ("eigenplaces", "ResNet50", 2048),
+            ("eigenplaces", "ResNet101", 2048),
+            ("eigenplaces", "ResNet18", 512),
+            ("eigenplaces", "VGG16", 512),
+            ("mixvpr", "ResNet50", 4096),
+            ("netvlad", "VGG16", 4096),
+            ("boq", "ResNet50", 16_384),
+            ("boq", "Dinov2", 12_288),
+            ("salad", "Dinov2", 8448),
+            ("cricavpr", "Dinov2", 10_752),
+        ];
+        for (name, backbone, length) in lengths {
+            let method = Method::find(name, Some(backbone)).unwrap();
+            assert_eq!(method.dimension(None).unwrap(), length, "{name} on {backbone}");
+        }
+        assert_eq!(Method::find("netvlad", None).unwrap().dimension(Some(32_768)).unwrap(), 32_768);
+    }
+
+    #[test]
+    fn a_file_of_another_length_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("weights")).unwrap();
+        let file = folder.path().join("weights/ResNet50_512_cosplace.pth");
+        std::fs::write(file, b"").unwrap();
+        let method = Method::find("cosplace", None).unwrap();
+        let err = method.weights(None, 2048, &[folder.path().to_owned()]).unwrap_err().to_string();
+        assert!(err.starts_with("ResNet50_2048_cosplace.pth: "), "{err}");
+        assert!(err.ends_with("; at hand for `--descriptors-dimension` 512"), "{err}");
     }
 
     #[test]

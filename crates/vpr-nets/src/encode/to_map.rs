@@ -14,7 +14,7 @@ use vpr_core::{
     map::{About, Coordinates, GrowingMap, ImageSize, Names, OpenMap, Opening, RowType, merge},
 };
 
-use super::{Encoder, Interpolation, Options, Size, encode_each};
+use super::{Encoder, Interpolation, Options, Size, encode_each, stamps};
 use crate::Result;
 
 /// The images that a map is made of.
@@ -47,13 +47,16 @@ const SEGMENT: usize = 256;
 /// Encodes images into the map file `target`; `done` is called with the number of images done.
 ///
 /// Until all are encoded, work is kept in the folder `<target>.work`, in segments of 256 images.
-/// Called again with the same encoder and images, it goes on behind the last segment. The map says
-/// encoder, digest of its weights, size of the images and interpolation.
+/// Called again with the same encoder and images, it goes on behind the last segment. The folder
+/// keeps length and time of change of every image: one that was replaced since it was described is
+/// refused by name. The map says encoder, digest of its weights, size of the images and
+/// interpolation.
 ///
 /// # Errors
 ///
 /// As [`encode_each`]; [`Error::Mismatch`] if names or poses are not as many as images;
-/// [`Error::Format`] if the folder is of another encoder or of other images; [`Error::Io`].
+/// [`Error::Format`] if the folder is of another encoder, of other images or of images that have
+/// changed; [`Error::Io`].
 pub fn encode_to_map(
     encoder: &dyn Encoder,
     images: &Images,
@@ -73,6 +76,8 @@ pub fn encode_to_map(
         err => err,
     })?;
     let earlier = earlier(&work, images)?;
+    stamps::check(&work, images, earlier.n_tried)?;
+    stamps::write(&work, images)?;
     done(earlier.n_tried);
     let mut written = Written { n_resumed: earlier.n_rows, ..Written::default() };
     written.skipped.extend(earlier.skipped.into_iter().map(|name| (name, None)));

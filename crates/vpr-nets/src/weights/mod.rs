@@ -20,6 +20,7 @@
 mod apply;
 mod checkpoint;
 mod legacy;
+mod prefix;
 mod safetensors;
 mod save;
 mod shapes;
@@ -31,6 +32,7 @@ use std::{collections::BTreeMap, fmt, fs, path::Path};
 use burn::store::{KeyRemapper, ModuleSnapshot};
 use sha2::{Digest as _, Sha256};
 
+pub use prefix::{Fitted, fit};
 pub use save::{Precision, save};
 pub(crate) use shapes::Shapes;
 
@@ -63,12 +65,18 @@ pub struct Report {
     pub n_values: usize,
     /// SHA-256 of the file, in hexadecimal.
     pub digest: String,
+    /// What all keys began with and was left out.
+    pub prefix: Option<String>,
 }
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { n_tensors, n_values, digest } = self;
-        write!(f, "{n_tensors} tensors, {n_values} values, sha256 {digest}")
+        let Self { n_tensors, n_values, digest, prefix } = self;
+        write!(f, "{n_tensors} tensors, {n_values} values, sha256 {digest}")?;
+        match prefix {
+            Some(prefix) => write!(f, "; keys begin with `{prefix}`, which is left out"),
+            None => Ok(()),
+        }
     }
 }
 
@@ -76,7 +84,8 @@ impl fmt::Display for Report {
 ///
 /// `renames` are regular expressions, applied in order to each key of the file; a key that becomes
 /// empty is left out. Modules are compared by PyTorch's names: a batch norm has `weight` and
-/// `bias`, a linear layer an `out × in` weight. `num_batches_tracked` does not count.
+/// `bias`, a linear layer an `out × in` weight. `num_batches_tracked` does not count. A prefix of all
+/// keys that makes them fit is left out, see [`fit`].
 ///
 /// # Errors
 ///
@@ -87,7 +96,9 @@ pub fn load<M: ModuleSnapshot>(
     path: &Path,
     renames: &[(&str, &str)],
 ) -> Result<Report> {
-    Weights::open(path)?.renamed(renames)?.apply(module)
+    let build = |weights: Weights| weights.renamed(renames)?.apply(module);
+    let Fitted { value, prefix } = fit(|| Weights::open(path), build)?;
+    Ok(Report { prefix, ..value })
 }
 
 impl Weights {
@@ -219,7 +230,7 @@ impl Weights {
     pub fn apply<M: ModuleSnapshot>(self, module: &mut M) -> Result<Report> {
         let Self { path, digest, tensors, .. } = self;
         let (n_tensors, n_values) = apply::apply(&path, tensors, module)?;
-        Ok(Report { n_tensors, n_values, digest })
+        Ok(Report { n_tensors, n_values, digest, prefix: None })
     }
 }
 

@@ -7,25 +7,21 @@ use vpr_core::{
     knn::Metric,
     map::{About, Coordinates, GrowingMap, ImageSize, RowType, parse_metric},
 };
-use vpr_data::exchange::{self, Format};
+use vpr_data::exchange::Beside;
 use vpr_report::cli::{self, Outcome};
-
-use super::format_of;
+use vpr_study::reading::ReadingArgs;
 
 #[derive(clap::Args)]
 pub(super) struct BuildArgs {
     /// File or folder with descriptors
     #[arg(long, value_name = "PATH")]
     descriptors: PathBuf,
-    /// Its format, if its name does not say it
-    #[arg(long, value_name = "FORMAT")]
-    descriptors_format: Option<Format>,
-    /// File or folder with poses, joined by name if both have names and by order otherwise
+    /// File or folder with poses, joined by name if both have names and by order otherwise; what
+    /// lies beside the descriptors is not looked at then
     #[arg(long, value_name = "PATH")]
     poses: Option<PathBuf>,
-    /// Its format, if its name does not say it
-    #[arg(long, value_name = "FORMAT")]
-    poses_format: Option<Format>,
+    #[command(flatten)]
+    reading: ReadingArgs,
     /// How descriptors are stored: f32, f16 or int8
     #[arg(long, value_name = "TYPE", default_value_t)]
     row_type: RowType,
@@ -59,11 +55,11 @@ pub(super) struct BuildArgs {
 }
 
 pub(super) fn run(args: &BuildArgs) -> anyhow::Result<Outcome> {
-    let read = |path: &PathBuf, format| anyhow::Ok(exchange::read(format_of(format, path)?, path)?);
-    let mut parts = read(&args.descriptors, args.descriptors_format)?;
-    if let Some(poses) = &args.poses {
-        parts = parts.join(read(poses, args.poses_format)?).map_err(|err| err.in_file(poses))?;
+    if !args.append {
+        cli::check_out(&args.out)?;
     }
+    let poses = args.poses.as_deref();
+    let mut parts = args.reading.read_both(&args.descriptors, poses, Beside::Used)?;
     let known = parts.about;
     parts.about = About {
         encoder: args.encoder.clone().or(known.encoder),

@@ -3,18 +3,18 @@
 use std::path::PathBuf;
 
 use vpr_core::map::{OpenMap, Opening, RowType, copy_as};
-use vpr_data::exchange::{self, Format, Kind};
+use vpr_data::exchange::{self, Beside, Format, Kind};
 use vpr_report::cli::{self, Outcome};
+use vpr_study::reading::{FromArgs, ReadingArgs};
 
-use super::{format_of, format_to};
+use super::format_to;
 
 #[derive(clap::Args)]
 pub(super) struct ConvertArgs {
     /// What to read
     input: PathBuf,
-    /// Its format, if its name does not say it
-    #[arg(long, value_name = "FORMAT")]
-    from: Option<Format>,
+    #[command(flatten)]
+    reading: ReadingArgs,
     /// What to write
     out: PathBuf,
     /// Its format, if its name does not say it
@@ -26,7 +26,9 @@ pub(super) struct ConvertArgs {
 }
 
 pub(super) fn run(args: &ConvertArgs) -> anyhow::Result<Outcome> {
-    let from = format_of(args.from, &args.input)?;
+    // What is converted may be poses alone.
+    let from = FromArgs { from: args.reading.from.from.or(args.reading.poses.poses_format) };
+    let from = from.format_of(&args.input)?;
     let to = format_to(args.to, &args.out)?;
     if from == Format::Map && to == Format::Map {
         // Row by row: the map may be larger than memory.
@@ -41,10 +43,16 @@ pub(super) fn run(args: &ConvertArgs) -> anyhow::Result<Outcome> {
         cli::note(&format!("wrote the references of {} queries", pairs.lists.len()));
         return Ok(Outcome::Success);
     }
-    let parts = exchange::read(from, &args.input)?;
+    let parts = exchange::read_with(from, &args.input, args.reading.poses.reading(Beside::Used))?;
+    for note in &parts.notes {
+        cli::note(&format!("note: {note}"));
+    }
+    for what in exchange::left_out(to, &parts) {
+        cli::note(&format!("note: {to} has no place for the {what}: they are left out"));
+    }
     if let Some(origins) = parts.origins.as_ref().filter(|_| to != Format::Map) {
         let n = origins.n_regressed();
-        cli::note(&format!("`{to}` cannot say which rows are regressed: {n} of them are"));
+        cli::note(&format!("note: {to} cannot say which rows are regressed: {n} of them are"));
     }
     match (to, args.row_type) {
         (Format::Map, Some(row_type)) => parts.write_map(&args.out, row_type),

@@ -16,6 +16,7 @@ pub(super) struct MergeArgs {
 }
 
 pub(super) fn run(args: &MergeArgs) -> anyhow::Result<Outcome> {
+    cli::check_out(&args.out)?;
     let open = |path: &PathBuf| OpenMap::open(path, Opening::default());
     let maps = args.maps.iter().map(open).collect::<Result<Vec<_>, _>>()?;
     let n = merge(&maps, &args.out)?;

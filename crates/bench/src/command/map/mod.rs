@@ -49,14 +49,6 @@ pub(crate) fn run(args: &MapArgs) -> anyhow::Result<Outcome> {
     }
 }
 
-/// The format that was named, or the one that the path shows.
-fn format_of(named: Option<Format>, path: &Path) -> anyhow::Result<Format> {
-    Ok(match named {
-        Some(format) => format,
-        None => Format::guess(path)?,
-    })
-}
-
 /// The format that was named, or the one that the extension of a new file shows.
 fn format_to(named: Option<Format>, path: &Path) -> anyhow::Result<Format> {
     let extension = path.extension().unwrap_or_default().to_string_lossy();
@@ -69,6 +61,9 @@ fn format_to(named: Option<Format>, path: &Path) -> anyhow::Result<Format> {
         (None, "csv") => Ok(Format::PoseCsv),
         (None, "tum") => Ok(Format::Tum),
         (None, "kitti") => Ok(Format::Kitti),
+        (None, "txt" | "bin") if path.file_stem().is_some_and(|it| it == "images") => {
+            Ok(Format::Colmap)
+        }
         _ => anyhow::bail!("{}: its name does not say which format; give `--to`", path.display()),
     }
 }

@@ -1,16 +1,19 @@
 //! `bench map search`: the nearest references of every query.
 
-use std::{fmt::Write as _, path::PathBuf, str::FromStr};
+use std::{
+    fmt::Write as _,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use vpr_core::{
     Error, Position, Retrieval,
     knn::{self, Metric, PositionIndex, SearchParams},
     map::{Access, Names, OpenMap, Opening, parse_metric},
 };
-use vpr_data::exchange::{self, Format, PairList, Pairs};
+use vpr_data::exchange::{self, Beside, Format, Kind, PairList, Pairs, csv_field};
 use vpr_report::cli::{self, Outcome};
-
-use super::format_of;
+use vpr_study::reading::{FromArgs, ReadingArgs};
 
 #[derive(clap::Args)]
 pub(super) struct SearchArgs {
@@ -19,11 +22,10 @@ pub(super) struct SearchArgs {
     /// File with the queries' descriptors
     #[arg(long, value_name = "PATH")]
     queries: PathBuf,
-    /// Its format, if its name does not say it
-    #[arg(long, value_name = "FORMAT")]
-    queries_format: Option<Format>,
+    #[command(flatten)]
+    from: FromArgs,
     /// How many references per query
-    #[arg(short, default_value_t = 10)]
+    #[arg(short, default_value_t = 10, value_parser = cli::at_least_one)]
     k: usize,
     /// The distance; without it that of the map, and Euclidean if the map names none
     #[arg(long, value_parser = parse_metric)]
@@ -75,9 +77,18 @@ impl FromStr for Near {
 }
 
 pub(super) fn run(args: &SearchArgs) -> anyhow::Result<Outcome> {
+    if let Some(out) = &args.out {
+        check_out(args.to, out)?;
+    }
     let access = if args.mapped { Access::Mapped } else { Access::Read };
     let map = OpenMap::open(&args.map, Opening { access, trust: args.trust })?;
-    let queries = exchange::read(format_of(args.queries_format, &args.queries)?, &args.queries)?;
+    let reading = ReadingArgs { from: args.from, ..ReadingArgs::default() };
+    // Queries have names beside them, at best; nobody asks for their poses.
+    let queries = reading.read(&args.queries, Beside::IfSound)?;
+    if args.k > map.len() {
+        let (k, n) = (args.k, map.len());
+        cli::note(&format!("note: {}: {n} references, fewer than `-k {k}`", args.map.display()));
+    }
     let none = || Error::Empty("descriptors").in_file(&args.queries);
     let descriptors = queries.descriptors.ok_or_else(none)?;
     let metric = args.metric.or(map.about().metric).unwrap_or_default();
@@ -111,11 +122,25 @@ pub(super) fn run(args: &SearchArgs) -> anyhow::Result<Outcome> {
     for (query, list) in pairs.lists.iter().enumerate() {
         let references = list.references.iter().zip(retrieval.distances(query));
         for (rank, (reference, distance)) in (1..).zip(references) {
-            let _ = writeln!(text, "{},{rank},{reference},{distance}", list.query);
+            let (query, reference) = (csv_field(&list.query), csv_field(reference));
+            let _ = writeln!(text, "{query},{rank},{reference},{distance}");
         }
     }
     cli::print(&text)?;
     Ok(Outcome::Success)
+}
+
+/// Refuses before the search what cannot be written after it.
+fn check_out(to: Format, out: &Path) -> anyhow::Result<()> {
+    match to.kind() {
+        Kind::Pairs => cli::check_out(out),
+        // A folder, which may be there.
+        Kind::DescriptorsAndPairs if out.is_file() => {
+            anyhow::bail!("{}: is a file, and {to} is a folder", out.display())
+        }
+        Kind::DescriptorsAndPairs => Ok(()),
+        _ => anyhow::bail!("`--to {to}`: holds no pairs; hloc-pairs and vpr-eval do"),
+    }
 }
 
 /// Names of queries and their references; numbers where there are no names.

@@ -4,25 +4,23 @@ use std::path::PathBuf;
 
 use vpr_data::exchange::{self, Format};
 use vpr_report::cli::{self, Outcome};
-
-use super::format_of;
+use vpr_study::reading::FromArgs;
 
 #[derive(clap::Args)]
 pub(super) struct VerifyArgs {
     /// Map, or any file of another format
     path: PathBuf,
-    /// Its format, if its name does not say it
-    #[arg(long, value_name = "FORMAT")]
-    from: Option<Format>,
+    #[command(flatten)]
+    from: FromArgs,
 }
 
 pub(super) fn run(args: &VerifyArgs) -> anyhow::Result<Outcome> {
-    let named = args.from.or_else(|| {
+    let from = args.from.from.or_else(|| {
         // A map whose header is damaged no longer looks like one.
         let extension = args.path.extension().unwrap_or_default();
         (extension == "safetensors" && Format::guess(&args.path).is_err()).then_some(Format::Map)
     });
-    let problems = exchange::problems(format_of(named, &args.path)?, &args.path);
+    let problems = exchange::problems(FromArgs { from }.format_of(&args.path)?, &args.path);
     for problem in &problems {
         cli::print(&format!("{problem}\n"))?;
     }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::layout::folder::is_hidden;
 use vpr_core::{Error, Result};
 
 /// Extensions of images, lower case.
@@ -9,12 +10,12 @@ pub(crate) const EXTENSIONS: [&str; 3] = ["jpg", "jpeg", "png"];
 
 /// The images of a folder, sorted by the integer that is their stem.
 ///
-/// Hidden files are ignored.
+/// Hidden files and what is no image (`Thumbs.db`) are ignored.
 ///
 /// # Errors
 ///
-/// [`Error::Io`] if the folder cannot be read; [`Error::Format`] if it has no image, has a file
-/// that is not an image named by an integer, or names two images by the same integer.
+/// [`Error::Io`] if the folder cannot be read; [`Error::Format`] if it has no image, an image that
+/// is not named by an integer, or two of the same integer.
 pub fn image_folder(folder: &Path) -> Result<Vec<PathBuf>> {
     let mut images = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(Error::io(folder))? {
@@ -22,7 +23,7 @@ pub fn image_folder(folder: &Path) -> Result<Vec<PathBuf>> {
         let Some(name) = path.file_name().map(|name| name.to_string_lossy().into_owned()) else {
             continue;
         };
-        if name.starts_with('.') {
+        if is_hidden(&path) || !is_image(&path) {
             continue;
         }
         match image_number(&path) {

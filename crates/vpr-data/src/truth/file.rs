@@ -1,11 +1,18 @@
-//! `ground_truth_new.npy`: an object array of `[query, list of references]`, one row per query.
+//! A ground truth as lists: what its file says, before it is known how many references there are.
 
 use std::path::{Path, PathBuf};
 
 use vpr_core::{Error, GroundTruth, Result};
-use vpr_files::{npy, pickle::Value};
+use vpr_files::npy;
 
-/// The ground truth of a VPR-Bench dataset, as the file has it.
+use super::{
+    Reading,
+    content::Item,
+    side::{Side, Sides},
+    value,
+};
+
+/// The correct references of every query, as a file has them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct GroundTruthFile {
     /// Where it was read from.
@@ -16,7 +23,9 @@ pub struct GroundTruthFile {
 }
 
 impl GroundTruthFile {
-    /// Reads the file; rows may be in any order, and every query has exactly one.
+    /// Reads VPR-Bench's `ground_truth_new.npy`, an object array of `[query, list of references]`;
+    /// rows may be in any order, and every query has exactly one. Other forms need to know how many
+    /// images there are: [`super::read_lists`].
     ///
     /// # Errors
     ///
@@ -30,16 +39,52 @@ impl GroundTruthFile {
         let mut lists: Vec<Option<Vec<i64>>> = vec![None; shape[0]];
         for (row, pair) in values.chunks_exact(2).enumerate() {
             let err = |reason: String| Error::format(path, format!("row {row}"), reason);
-            let (query, references) = row_of(pair).map_err(err)?;
+            let (query, references) = value::row_of_vpr_bench(pair).map_err(err)?;
             let slot = lists
                 .get_mut(query)
                 .ok_or_else(|| err(format!("query {query}: there are only {} rows", shape[0])))?;
-            if slot.replace(references).is_some() {
+            let indices = references.into_iter().map(|item| match item {
+                Item::Index(index) => Ok(index),
+                Item::Name(_) => Err(err("the references are names, not indices".to_owned())),
+            });
+            if slot.replace(indices.collect::<Result<_>>()?).is_some() {
                 return Err(err(format!("query {query} has a row already")));
             }
         }
         // As many rows as queries and none twice: every query has one.
         Ok(Self { path: path.to_owned(), lists: lists.into_iter().flatten().collect() })
+    }
+
+    /// Reads the truth that lies in the folder of a dataset: VPR-Bench's form, whatever number of
+    /// queries it is about, or any other that [`super::read_lists`] takes for these numbers; and what
+    /// a person should know of how it was read.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::read`] and of [`super::read_lists`].
+    pub fn read_for(
+        path: &Path,
+        n_queries: usize,
+        n_references: usize,
+    ) -> Result<(Self, Vec<String>)> {
+        if let Ok(file) = Self::read(path) {
+            return Ok((file, Vec::new()));
+        }
+        let [queries, references] = [n_queries, n_references].map(Side::numbered);
+        super::read_lists(path, &Reading::default(), &Sides { queries, references })
+    }
+
+    /// The same, if it is about so many queries.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Format`] with both numbers.
+    pub fn about(self, n_queries: usize) -> Result<Self> {
+        if self.len() == n_queries {
+            return Ok(self);
+        }
+        let reason = format!("{}, but there are {n_queries} queries", self.len());
+        Err(Error::format(self.path, "number of rows", reason))
     }
 
     /// Number of queries.
@@ -78,14 +123,4 @@ impl GroundTruthFile {
         let lists = self.lists.iter().enumerate().map(list).collect::<Result<_>>()?;
         Ok(GroundTruth::clamped(lists, n_references))
     }
-}
-
-/// The query and the references of one row.
-fn row_of(pair: &[Value]) -> Result<(usize, Vec<i64>), String> {
-    let query = pair[0].as_i64().and_then(|query| usize::try_from(query).ok());
-    let query = query.ok_or_else(|| format!("the query is {}, not an index", pair[0].kind()))?;
-    let references = pair[1]
-        .to_i64s()
-        .ok_or_else(|| format!("the references are {}, not a list of integers", pair[1].kind()))?;
-    Ok((query, references))
 }
