@@ -52,6 +52,11 @@ impl<'a> Report<'a> {
         result.map_err(|reason| self.line(line, reason)).ok()
     }
 
+    /// Whether there is a problem so far.
+    pub(super) fn has_problems(&self) -> bool {
+        !self.problems.is_empty()
+    }
+
     /// The content, if there was no problem.
     pub(super) fn finish<T>(self, content: T) -> Read<T> {
         if self.problems.is_empty() { Ok(content) } else { Err(self.problems) }

@@ -186,7 +186,7 @@ impl<'a> Table<'a> {
             report
                 .at(place, format!("`{name}` appears twice, first on line {}", self.lines[first]));
         }
-        if self.lines.is_empty() {
+        if self.lines.is_empty() && !report.has_problems() {
             report.line(header.line + 1, "there is no pose");
         }
         let mut notes = notes(path, header, reading);
