@@ -150,7 +150,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         if place.is_some() {
             let format = result::format_of(OutputFormat::Csv);
             let (values, auc_pr) = (&args.recall_values, args.auc_pr);
-            let table = result::table(values, auc_pr, format, provenance, &retrieved, truth)?;
+            let table = result::table(values, auc_pr, provenance, &retrieved, truth)?;
             files.push(("metrics.csv", table.render(format)));
         }
     }
@@ -183,8 +183,8 @@ fn print(
     if args.format != OutputFormat::Line {
         let format = result::format_of(args.format);
         let (values, auc_pr) = (&args.recall_values, args.auc_pr);
-        let table = result::table(values, auc_pr, format, provenance, retrieved, truth)?;
-        cli::print(&table.render(format))?;
+        let table = result::table(values, auc_pr, provenance, retrieved, truth)?;
+        cli::print(&table.render_within(format, cli::columns()))?;
     }
     Ok(())
 }
@@ -240,6 +240,9 @@ impl EvaluateArgs {
         let matched = query_features.match_with(&reference_features)?;
         let descriptors =
             query_features.into_descriptors().zip(reference_features.into_descriptors());
-        Ok(Retrieved { descriptors, ..Retrieved::of_scores([queries, references], matched.similarities, k)? })
+        Ok(Retrieved {
+            descriptors,
+            ..Retrieved::of_scores([queries, references], matched.similarities, k)?
+        })
     }
 }

@@ -5,8 +5,8 @@ use clap::ValueEnum;
 use vpr_core::{
     Definition, Evaluation, GroundTruth, Judged, Provenance, Ranking,
     metrics::{
-        bootstrap::{Interval, Resampling, Z_95, wilson_interval},
-        recall_at,
+        bootstrap::{Interval, Z_95, wilson_interval},
+        effective, recall_at,
     },
 };
 use vpr_report::table::{Cell, Format, Table};
@@ -49,12 +49,10 @@ pub(super) fn auc_pr_line(retrieved: &Retrieved, truth: &GroundTruth) -> vpr_cor
     Ok(format!("AUC-PR: {published:.3} (published), {corrected:.3} (corrected)"))
 }
 
-/// All numbers with 95 % intervals over the choice of queries; for reading, low and high ends are
-/// columns of their own.
+/// All numbers with 95 % intervals over the choice of queries.
 pub(super) fn table(
     recall_values: &[usize],
     auc_pr: bool,
-    format: Format,
     provenance: Provenance,
     retrieved: &Retrieved,
     truth: &GroundTruth,
@@ -65,7 +63,7 @@ pub(super) fn table(
         truth.n_references(),
         truth.n_known()
     );
-    let mut numbers = Numbers { table: Table::new("evaluation", title), n, format, provenance };
+    let mut numbers = Numbers { table: Table::new("evaluation", title), n, provenance };
     let alone = retrieved.alone.as_ref();
     let rankings = [("", Some(&retrieved.ranking)), (" (images one by one)", alone)];
     for (suffix, ranking) in rankings {
@@ -79,8 +77,18 @@ pub(super) fn table(
         let judged = Judged::new(&retrieved.ranking.best(), truth)?;
         let evaluation = Evaluation::of_confidence(&retrieved.confidence, &judged)?;
         for definition in [Definition::Published, Definition::Corrected] {
-            let interval = evaluation.auc_pr_interval(definition, &Resampling::default());
-            numbers.push_area(definition, interval, evaluation.auc_pr(definition)?)?;
+            let interval = evaluation.auc_pr_interval(definition);
+            match interval {
+                Ok(interval) => {
+                    numbers.push("AUC-PR", Some(definition), interval, effective::METHOD);
+                }
+                Err(err @ vpr_core::Error::Undefined { .. }) => {
+                    let area = evaluation.auc_pr(definition)?;
+                    let cell = numbers.cell("AUC-PR", "value", Some(definition), area);
+                    numbers.table.push(cell.noted(err.to_string()));
+                }
+                Err(err) => return Err(err),
+            }
         }
     }
     Ok(numbers.table)
@@ -90,7 +98,6 @@ pub(super) fn table(
 struct Numbers {
     table: Table,
     n: usize,
-    format: Format,
     provenance: Provenance,
 }
 
@@ -106,32 +113,6 @@ impl Numbers {
     fn push(&mut self, row: &str, definition: Option<Definition>, it: Interval, method: &str) {
         let value = self.cell(row, "value", definition, it.estimate);
         self.table.push(value.within(it.low, it.high, method));
-        if self.format == Format::Table {
-            for (column, end) in [("low", it.low), ("high", it.high)] {
-                self.table.push(self.cell(row, column, definition, end));
-            }
-        }
-    }
-
-    /// AUC-PR with its interval, or with the reason why there is none.
-    fn push_area(
-        &mut self,
-        definition: Definition,
-        interval: vpr_core::Result<Interval>,
-        area: f64,
-    ) -> vpr_core::Result<()> {
-        const ROW: &str = "AUC-PR";
-        match interval {
-            Ok(interval) => {
-                self.push(ROW, Some(definition), interval, "bootstrap over queries");
-            }
-            Err(err @ vpr_core::Error::Undefined { .. }) => {
-                let cell = self.cell(ROW, "value", Some(definition), area);
-                self.table.push(cell.noted(err.to_string()));
-            }
-            Err(err) => return Err(err),
-        }
-        Ok(())
     }
 }
 

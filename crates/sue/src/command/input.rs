@@ -286,8 +286,7 @@ impl InputArgs {
             Some(file) => joined(Parts::default(), file, n, self.reading)?,
             None => Parts::default(),
         };
-        let (references, queries) =
-            (side(n, known)?, side(scores.n_queries(), Parts::default())?);
+        let (references, queries) = (side(n, known)?, side(scores.n_queries(), Parts::default())?);
         Ok((references, queries, scores.length()))
     }
 }

@@ -35,7 +35,10 @@ mod side;
 mod text;
 mod value;
 
-use std::path::{Path, PathBuf};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+};
 
 use vpr_core::{Error, GroundTruth, Result};
 use vpr_files::{npy, pickle};
@@ -101,6 +104,20 @@ pub struct Found {
     pub truth: GroundTruth,
     /// One line each.
     pub notes: Vec<String>,
+}
+
+impl fmt::Display for Source {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(path, _) => write!(f, "as {} has them", path.display()),
+            Self::Labels(Labels::Folders) => f.write_str("those in folders of the same name"),
+            Self::Labels(Labels::File { path, .. }) => {
+                write!(f, "those with the same label in {}", path.display())
+            }
+            Self::SameIndex(0) => f.write_str("the one with the same index"),
+            Self::SameIndex(n) => write!(f, "those with the same index, give or take {n}"),
+        }
+    }
 }
 
 impl Form {
