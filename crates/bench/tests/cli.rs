@@ -253,7 +253,7 @@ fn wrong_descriptors_are_refused_by_file_and_place() {
     let labels = ["--no-labels"];
     npy::write_f32(&dir.path().join("q.npy"), array![[0.9_f32, f32::NAN]].view()).unwrap();
     assert_refused(&evaluate(dir.path(), &labels), &["q.npy", "row 0", "column 1", "NaN"]);
-    npy::write_f32(&dir.path().join("q.npy"), array![[1.0_f32]].view()).unwrap();
+    npy::write_f32(&dir.path().join("q.npy"), array![[1.0_f32], [1.0]].view()).unwrap();
     assert_refused(&evaluate(dir.path(), &labels), &["q.npy", "expected 2, got 1"]);
     let whole = fs::read(dir.path().join("r.npy")).unwrap();
     fs::write(dir.path().join("q.npy"), &whole[..whole.len() - 3]).unwrap();

@@ -253,7 +253,7 @@ fn everything_wrong_is_reported_at_once() {
             "error: query/three.jpg: is not named by an integer",
             "error: query/5.jpg: `query/0000005.jpg` has number 5, too",
             "warning: query: after 2, before 4: numbers are missing in between; indices are positions, not numbers",
-            "error: ref/notes.txt: is not a .jpg, .jpeg or .png image",
+            "warning: ref/notes.txt: is no .jpg, .jpeg or .png image, and not looked at",
             "error: ref/0000000.jpg: is not a whole JPEG",
             "error: ground_truth_new.npy: number of rows: 4, but query/ has 12 images",
             "warning: ground_truth_new.npy: query 0: reference 12 does not exist, of 12; dropped",

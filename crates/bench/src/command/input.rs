@@ -167,8 +167,10 @@ impl Input {
         match content {
             Content::Images => args.match_images(queries, references, k),
             Content::Rows([query_rows, reference_rows]) => {
-                let what = || "queries and references".to_owned();
-                nearest(queries, references, query_rows, reference_rows, k).with_context(what)
+                let found = nearest(queries, references, query_rows, reference_rows, k);
+                let files = args.queries_descriptors.iter().chain(&args.database_descriptors);
+                let files: Vec<_> = files.map(|it| it.display().to_string()).collect();
+                found.with_context(|| files.join(" and "))
             }
             Content::Scores(scores) => Retrieved::of_scores([queries, references], scores, k),
         }

@@ -44,6 +44,11 @@ pub(super) fn run(args: &ConvertArgs) -> anyhow::Result<Outcome> {
         return Ok(Outcome::Success);
     }
     let parts = exchange::read_with(from, &args.input, args.reading.poses.reading(Beside::Used))?;
+    match (to, args.row_type) {
+        (Format::Map, Some(row_type)) => parts.write_map(&args.out, row_type),
+        _ => exchange::write(to, &args.out, &parts),
+    }
+    .map_err(|err| err.in_file(&args.input))?;
     for note in &parts.notes {
         cli::note(&format!("note: {note}"));
     }
@@ -54,10 +59,5 @@ pub(super) fn run(args: &ConvertArgs) -> anyhow::Result<Outcome> {
         let n = origins.n_regressed();
         cli::note(&format!("note: {to} cannot say which rows are regressed: {n} of them are"));
     }
-    match (to, args.row_type) {
-        (Format::Map, Some(row_type)) => parts.write_map(&args.out, row_type),
-        _ => exchange::write(to, &args.out, &parts),
-    }
-    .map_err(|err| err.in_file(&args.input))?;
     Ok(Outcome::Success)
 }
