@@ -192,10 +192,7 @@ fn numbers_come_with_intervals_and_all_digits() {
     assert_eq!(line.lines().next(), LINE.lines().next());
     assert!(line.contains("AUC-PR: "), "{line}");
     let table = success(&with("table"));
-    assert!(
-        table.starts_with(LINE) && table.contains(".33 (.1–.8)"),
-        "{table}"
-    );
+    assert!(table.starts_with(LINE) && table.contains(".33 (.1–.8)"), "{table}");
     let json = with("json");
     let value: Value = serde_json::from_str(&success(&json)).unwrap();
     assert!(text(&json.stderr).contains(LINE.trim_end()), "the line stays visible");

@@ -52,7 +52,7 @@ fn every_form_of_the_truth_gives_the_same_numbers() {
     let positions = [&numbered[..], &["--query-poses", "q_poses.csv"]].concat();
     let expected = [evaluate.as_slice(), &calibrate]
         .map(|command| sue(folder, &[command, positions.as_slice()].concat()));
-    assert!(expected[0].contains("l2"), "{}", expected[0]);
+    assert!(expected[0].contains("L2-distance"), "{}", expected[0]);
     let mut n = 0;
     for case in files::write_all(folder).iter().filter(|case| !case.by_folder) {
         let input = if case.by_name { named.as_slice() } else { &numbered };

@@ -48,7 +48,7 @@ enum ScopeChoice {
 }
 
 pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
-    let input = args.input.open()?;
+    let input = args.input.open(&[args.estimator])?;
     let truth = args.truth.truth(&input)?;
     let retrieval = input.retrieve()?;
     let judged = Judged::new(&retrieval.best(), &truth)?;

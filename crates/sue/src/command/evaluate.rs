@@ -44,7 +44,7 @@ pub(crate) struct EvaluateArgs {
 const DIFFERENCE: &str = "paired bootstrap over queries";
 
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
-    let input = args.input.open()?;
+    let input = args.input.open(&args.estimator)?;
     let truth = args.truth.truth(&input)?;
     let retrieval = input.retrieve()?;
     let judged = Judged::new(&retrieval.best(), &truth)?;

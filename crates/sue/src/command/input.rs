@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use sue::{DistanceKind, EstimatorSettings, Sue, SueParams};
+use sue::{DistanceKind, EstimatorChoice, EstimatorSettings, Sue, SueParams};
 use vpr_core::{
     Descriptors, Error, Poses, Retrieval,
     knn::{self, Metric, RowLengths, RowSource, SearchParams, Selected},
@@ -211,12 +211,12 @@ fn joined(parts: Parts, file: &Path, n: usize, reading: ReadingArgs) -> anyhow::
 }
 
 impl InputArgs {
-    /// Opens both sides.
-    pub(crate) fn open(&self) -> anyhow::Result<Input> {
+    /// Opens both sides, for these estimators.
+    pub(crate) fn open(&self, estimators: &[EstimatorChoice]) -> anyhow::Result<Input> {
         let scores = self.scores.open()?;
         let (references, queries, scale) = match &scores {
             Some(scores) => self.of_scores(scores)?,
-            None => self.sides()?,
+            None => self.sides(estimators)?,
         };
         let [map, query_file] = [&self.map, &self.queries].map(|it| it.clone().unwrap_or_default());
         let distance = match self.distance {
@@ -248,7 +248,7 @@ impl InputArgs {
 
 impl InputArgs {
     /// Descriptors of both sides, checked against each other.
-    fn sides(&self) -> anyhow::Result<(Side, Side, Scale)> {
+    fn sides(&self, estimators: &[EstimatorChoice]) -> anyhow::Result<(Side, Side, Scale)> {
         let (Some(map), Some(queries)) = (&self.map, &self.queries) else {
             anyhow::bail!("give --map and --queries, --distances or --similarities");
         };
@@ -270,7 +270,8 @@ impl InputArgs {
             Measured { path: map, lengths: references.rows.lengths()? },
             Measured { path: queries, lengths: opened.rows.lengths()? },
         ];
-        let scale = self.normalization.decide(metric, &measured)?;
+        let needs_length_1 = estimators.iter().any(|it| it.depends_on_length());
+        let scale = self.normalization.decide(metric, &measured, needs_length_1)?;
         Ok((references, opened, scale))
     }
 

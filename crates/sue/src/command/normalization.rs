@@ -13,7 +13,8 @@ use vpr_report::cli;
 /// Whether descriptors are scaled to length 1.
 #[derive(clap::Args)]
 pub(crate) struct NormalizationArgs {
-    /// Scale descriptors to length 1, as the studies do [default: where they are not, with a warning]
+    /// Scale descriptors to length 1, as the studies do [default: with a warning, where they are not
+    /// and the estimator depends on how long they are]
     #[arg(long, conflicts_with_all = ["no_normalize", "distances", "similarities"])]
     normalize: bool,
     /// Take descriptors as they are, whatever their lengths
@@ -39,8 +40,14 @@ pub(super) struct Measured<'a> {
 }
 
 impl NormalizationArgs {
-    /// How descriptors that were made for `metric` and have these lengths are compared.
-    pub(super) fn decide(&self, metric: Metric, sides: &[Measured<'_>]) -> Result<Scale> {
+    /// How descriptors that were made for `metric` and have these lengths are compared;
+    /// `needs_length_1` if an estimator depends on lengths.
+    pub(super) fn decide(
+        &self,
+        metric: Metric,
+        sides: &[Measured<'_>],
+        needs_length_1: bool,
+    ) -> Result<Scale> {
         if self.normalize {
             return Ok(Scale::ToUnit);
         }
@@ -58,17 +65,26 @@ impl NormalizationArgs {
             return Ok(Scale::Unit);
         }
         let long = long.join("; ");
-        cli::note(&if self.no_normalize {
-            format!(
-                "warning: {long}: lambda, and thresholds of descriptors of length 1, do not fit these distances"
+        let (said, scale) = if self.no_normalize {
+            (
+                "lambda, and thresholds of descriptors of length 1, do not fit these distances",
+                Scale::Other,
+            )
+        } else if needs_length_1 {
+            (
+                "they are scaled to length 1, as the studies do; --normalize does so without a \
+                 warning, --no-normalize takes them as they are",
+                Scale::ToUnit,
             )
         } else {
-            format!(
-                "warning: {long}: they are scaled to length 1, as the studies do; --normalize does so without \
-                 a warning, --no-normalize takes them as they are"
+            (
+                "they are taken as they are, and thresholds of descriptors of length 1 do not fit \
+                 these distances; --normalize scales them",
+                Scale::Other,
             )
-        });
-        Ok(if self.no_normalize { Scale::Other } else { Scale::ToUnit })
+        };
+        cli::note(&format!("warning: {long}: {said}"));
+        Ok(scale)
     }
 }
 

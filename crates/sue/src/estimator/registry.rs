@@ -88,6 +88,13 @@ impl EstimatorChoice {
         Self::Uniform,
     ];
 
+    /// Whether its uncertainty is made for descriptors of length 1: weights decay with distance,
+    /// similarities are cosines.
+    #[must_use]
+    pub fn depends_on_length(self) -> bool {
+        !matches!(self, Self::L2 | Self::Pa | Self::Uniform)
+    }
+
     /// Its family.
     #[must_use]
     pub fn category(self) -> Category {

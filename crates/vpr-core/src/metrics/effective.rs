@@ -52,7 +52,8 @@ pub(crate) fn precision_recall(
     let moments = pr_area(&with_one_more_of_each(groups), definition);
     let (without, with) = own_match(groups, definition);
     let n_right = groups.iter().map(|it| it.right).sum();
-    around(estimate, (without.min(estimate), with.max(estimate)), moments, student_95(n_right))
+    let ends = (without.min(estimate), with.max(estimate));
+    around(estimate, ends, moments, (size(groups), student_95(n_right)))
 }
 
 /// 95 % interval of `estimate`, the area under the ROC curve of right against wrong matches, at
@@ -61,7 +62,7 @@ pub(crate) fn roc(groups: &[Group], estimate: f64) -> Interval {
     let moments = roc_area(&with_one_more_of_each(groups));
     let (n_right, n) =
         groups.iter().fold((0.0, 0.0), |(right, all), it| (right + it.right, all + it.size()));
-    around(estimate, (estimate, estimate), moments, student_95(n_right.min(n - n_right)))
+    around(estimate, (estimate, estimate), moments, (n, student_95(n_right.min(n - n_right))))
 }
 
 /// Wilson's interval, its ends around these two values.
@@ -69,10 +70,10 @@ fn around(
     estimate: f64,
     (low, high): (f64, f64),
     Area { value, variance }: Area,
-    z: f64,
+    (n, z): (f64, f64),
 ) -> Interval {
-    // Positive: every group of the smoothed matches has some of each kind.
-    let n_effective = value * (1.0 - value) / variance;
+    // Where many are tied the variance may be tiny, or none: that is not more than was seen.
+    let n_effective = (value * (1.0 - value) / variance).min(n);
     Interval {
         estimate,
         // By rounding an area may be above 1.
@@ -84,12 +85,16 @@ fn around(
 
 /// One right and one wrong match more, spread evenly over the ranks.
 fn with_one_more_of_each(groups: &[Group]) -> Vec<Group> {
-    let n: f64 = groups.iter().map(|it| it.size()).sum();
+    let n = size(groups);
     let more = |it: &Group| {
         let share = it.size() / n;
         Group { right: it.right + share, wrong: it.wrong + share, unknown: it.unknown }
     };
     groups.iter().map(more).collect()
+}
+
+fn size(groups: &[Group]) -> f64 {
+    groups.iter().map(|it| it.size()).sum()
 }
 
 /// What recall is relative to.
@@ -300,6 +305,14 @@ mod tests {
         assert_eq!(area.value, 0.75);
         // Shares of the wrong below: 1 and 1/2; of the right above: 1/2 and 1; each ¼ off, halved.
         assert_eq!(area.variance, 4.0 * (0.25_f64 / 2.0).powi(2));
+    }
+
+    #[test]
+    fn ties_of_all_are_worth_no_more_than_their_number() {
+        let interval = roc(&groups(&[(10, 10, 0)]), 0.5);
+        // Wilson's of 10 of 20 is .299 to .701; Student's quantile is a little wider.
+        assert!((0.25..0.31).contains(&interval.low), "{interval:?}");
+        assert!((interval.low + interval.high - 1.0).abs() < 1e-12, "{interval:?}");
     }
 
     #[test]
