@@ -226,8 +226,10 @@ fn what_calibrate_writes_estimate_reads() {
 
     let number = save("number.json", "mixed.npy", "--estimator l2");
     assert!(number["threshold"].as_f64().is_some_and(|it| it > 0.0), "{number}");
-    assert_eq!(number["n_accepted"], 100);
-    assert_eq!(accepted("number.json", "--estimator l2"), 100);
+    // The right half, and the few of the others that the precision leaves room for.
+    let n_accepted = number["n_accepted"].as_u64().unwrap();
+    assert!((100..=105).contains(&n_accepted), "{number}");
+    assert_eq!(accepted("number.json", "--estimator l2") as u64, n_accepted);
     fs::write(road.path("own.json"), r#"{"threshold": 1e-9}"#).unwrap();
     assert_eq!(accepted("own.json", "--estimator l2"), 100);
     assert_eq!(accepted("1e-9", "--estimator l2"), 100);
