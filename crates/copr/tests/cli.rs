@@ -204,6 +204,40 @@ fn the_oracle_needs_poses_only() {
 }
 
 #[test]
+fn a_report_shows_where_queries_were_placed() {
+    let world = World::new();
+    world.ok("densify --map sparse.safetensors --between 1 --regressor linear -o d.safetensors");
+    world.ok("localize --map d.safetensors --queries queries.safetensors --report r.html");
+    let html = std::fs::read_to_string(world.path("r.html")).unwrap();
+    for part in ["Where queries were taken", "references within 0.5 m", "(regressed)", "q-3"] {
+        assert!(html.contains(part), "`{part}` is not in the report");
+    }
+    let oracle = "localize --map d.safetensors --queries queries.safetensors --oracle";
+    world.ok(&format!("{oracle} --report o.html"));
+    assert!(world.path("o.html").is_file());
+}
+
+#[test]
+fn pairs_that_are_near_can_be_learnt_from() {
+    let world = World::new();
+    let train = "train regressor --training sparse.safetensors --validation queries.safetensors \
+                 --output h.safetensors --dry-run";
+    let (out, _) = world.ok(&format!("{train} --near 2.4,10"));
+    let count = |text: &str| -> usize {
+        let line = text.lines().find_map(|it| it.strip_prefix("training pairs: ")).unwrap();
+        line.parse().unwrap()
+    };
+    let some = count(&out);
+    assert!(some > 0 && some.is_multiple_of(2), "{out}");
+    let (out, _) = world.ok(&format!("{train} --near 99,180"));
+    assert_eq!(count(&out), 2 * N * (N - 1));
+    let (out, _) = world.ok(&format!("{train} --near 99,180 --at-most 7"));
+    assert!(out.contains("training pairs: 7\nvalidation pairs: 7\n"), "{out}");
+    let err = world.refused(&format!("{train} --near 99"));
+    assert!(err.contains("is not metres and degrees"), "{err}");
+}
+
+#[test]
 fn a_small_network_is_trained_and_used() {
     let world = World::new();
     let train = "train regressor --training sparse.safetensors --validation queries.safetensors \

@@ -8,14 +8,17 @@ use std::{
 use anyhow::{bail, ensure};
 use copr::{PoseErrors, WITHIN, oracle};
 use vpr_core::{
-    Error, Pose, Poses,
+    Error, GroundTruth, Pose, Poses,
     knn::{self, SearchParams},
     map::{Access, Names, OpenMap, Opening, Origins},
     metrics::bootstrap::{Interval, Resampling},
 };
 use vpr_data::exchange::{self, Format, Parts};
 use vpr_files::replace;
-use vpr_report::cli::{self, Outcome};
+use vpr_report::{
+    cli::{self, Outcome, ReportArgs},
+    report::{Dataset, Match, Report, Run},
+};
 
 /// The map, the queries and what is known of them.
 #[derive(clap::Args)]
@@ -44,6 +47,8 @@ pub(crate) struct LocalizeArgs {
     /// Write there instead of stdout
     #[arg(long, short, value_name = "PATH")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 pub(crate) fn run(args: &LocalizeArgs) -> anyhow::Result<Outcome> {
@@ -78,7 +83,62 @@ pub(crate) fn run(args: &LocalizeArgs) -> anyhow::Result<Outcome> {
     if let Some(errors) = &errors {
         cli::note(&summary(errors)?);
     }
+    if args.report.path.is_some() {
+        report(args, &queries, &found, (&poses, map.names()?.as_ref(), origins.as_ref()))?;
+    }
     Ok(Outcome::Success)
+}
+
+/// The report that the flags ask for: where each query was placed. Right are references within
+/// the middle one of [`WITHIN`]'s distances.
+fn report(
+    args: &LocalizeArgs,
+    queries: &Parts,
+    found: &Found,
+    (poses, names, origins): (&Poses, Option<&Names>, Option<&Origins>),
+) -> anyhow::Result<()> {
+    let (radius_m, _) = WITHIN[1];
+    let truth = match &queries.poses {
+        Some(at @ Poses::SixDof(_)) => Some(GroundTruth::within_radius(at, poses, radius_m)?),
+        _ => None,
+    };
+    let plain = |names: Option<&Names>, index: usize| {
+        names.and_then(|all| all.get(index)).map_or_else(|| index.to_string(), str::to_owned)
+    };
+    let of_reference = |row: usize| {
+        let is_measured = origins.is_none_or(|all| all.is_measured(row));
+        let name = plain(names, row);
+        if is_measured { name } else { format!("{name} (regressed)") }
+    };
+    let matches = found.best.iter().enumerate().map(|(query, &reference)| {
+        let distance = found.distances.as_ref().map_or(f64::NAN, |all| f64::from(all[query]));
+        vec![Match { reference, distance, inliers: None }]
+    });
+    let dataset = Dataset {
+        name: "queries on the map".to_owned(),
+        queries: (0..found.best.len()).map(|at| plain(queries.names.as_ref(), at)).collect(),
+        references: (0..poses.len()).map(of_reference).collect(),
+        poses: queries.poses.as_ref().map(|at| (at, poses)),
+        truth: truth.as_ref(),
+        thumbnails: None,
+        similarities: None,
+    };
+    let name = if args.oracle { "nearest in space" } else { "nearest descriptor" };
+    let run = Run { name: name.to_owned(), matches: matches.collect(), ..Run::default() };
+    let mut facts = vec![
+        ("command".to_owned(), cli::command_line()),
+        ("program".to_owned(), format!("copr {}", env!("CARGO_PKG_VERSION"))),
+    ];
+    if truth.is_some() {
+        facts.push(("right".to_owned(), format!("references within {radius_m} m")));
+    }
+    args.report.write(&Report {
+        title: "Where queries were taken".to_owned(),
+        facts,
+        datasets: vec![dataset],
+        runs: vec![run],
+        budget: args.report.budget(),
+    })
 }
 
 /// A file in the format that was named, or in the one that its name shows.

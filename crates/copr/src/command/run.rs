@@ -1,5 +1,7 @@
 //! `copr run`: experiment files.
 
+use std::path::PathBuf;
+
 use copr::study::{self, Context, Study};
 use vpr_report::cli::{self, Bar, Outcome, RunArgs};
 use vpr_study::Sources;
@@ -10,9 +12,9 @@ pub(super) const CHAPTER: &str = "copr";
 pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     let experiments = args.open::<Study>(CHAPTER)?;
     let bar = Bar::default();
-    let workspace_data = args.workspace_data();
-    let sources = Sources::new([&*args.data.data, &workspace_data], &args.data.cache, &bar);
-    let bare = Sources::new([], &args.data.cache, &bar);
+    let (folders, cache) = (args.folders(), args.cache());
+    let sources = Sources::new(folders.iter().map(PathBuf::as_path), &cache, &bar);
+    let bare = Sources::new([], &cache, &bar);
     let without = sources.without_weights()?;
     let mut outcome = Outcome::Success;
     for experiment in &experiments {

@@ -4,6 +4,7 @@ use std::{
     ops::Range,
     path::{Path, PathBuf},
     slice,
+    str::FromStr,
 };
 
 use anyhow::{bail, ensure};
@@ -64,6 +65,13 @@ struct RegressorArgs {
     /// Every so many-th image of a sequence is an anchor [default: 50, or what the experiment says]
     #[arg(long, value_name = "K")]
     every: Option<usize>,
+    /// Learn from every two images of a sequence so many metres and degrees apart or less, in both
+    /// orders, instead of from each anchor and the images that follow it
+    #[arg(long, value_name = "M,DEG", conflicts_with = "every")]
+    near: Option<Limits>,
+    /// Take at most so many of the training pairs and so many of those for validation, evenly
+    #[arg(long, value_name = "N", default_value_t = usize::MAX, hide_default_value = true)]
+    at_most: usize,
     /// Whether H is told of translations in the axes of the world, as released, or of the anchor
     #[arg(long, value_enum, default_value_t = Relative::Corrected, value_name = "NAME")]
     definition: Relative,
@@ -106,6 +114,22 @@ enum Relative {
     Published,
     /// In the axes of the anchor
     Corrected,
+}
+
+/// `0.8,30`
+#[derive(Clone, Copy)]
+struct Limits(f64, f64);
+
+impl FromStr for Limits {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parsed = text.split_once(',').map(|(m, deg)| (m.trim().parse(), deg.trim().parse()));
+        match parsed {
+            Some((Ok(m), Ok(deg))) => Ok(Self(m, deg)),
+            _ => Err(format!("`{text}` is not metres and degrees as in 0.8,30")),
+        }
+    }
 }
 
 pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<Outcome> {
@@ -167,6 +191,18 @@ impl RegressorArgs {
         }
     }
 
+    /// The pairs of some sequences; of anchors every `every`-th image is one.
+    fn pairs(&self, map: Map, sequences: &[Range<usize>], every: usize) -> copr::Result<Pairs> {
+        let definition = self.definition();
+        let all = match self.near {
+            Some(Limits(metres, degrees)) => {
+                Pairs::near(map, sequences, (metres, degrees), definition)
+            }
+            None => Pairs::following(map, sequences, every, definition),
+        };
+        Ok(all?.thinned(self.at_most))
+    }
+
     fn of_maps(&self, training: &Path, validation: &Path) -> anyhow::Result<Material> {
         let every = self.every.unwrap_or(50);
         let open = |path: &Path| -> anyhow::Result<(Pairs, Option<String>)> {
@@ -177,7 +213,8 @@ impl RegressorArgs {
                 path.display()
             );
             let sequences = sequences(map.names()?.as_ref(), map.len());
-            let pairs = Pairs::following(map.to_map()?, &sequences, every, self.definition())
+            let pairs = self
+                .pairs(map.to_map()?, &sequences, every)
                 .map_err(|err| anyhow::Error::from(err).context(path.display().to_string()))?;
             Ok((pairs, map.about().encoder.clone()))
         };
@@ -198,8 +235,9 @@ impl RegressorArgs {
         };
         let every = self.every.unwrap_or(rooms.every);
         let bar = Bar::default();
-        let sources = Sources::new([&*self.data.data], &self.data.cache, &bar);
-        let bare = Sources::new([], &self.data.cache, &bar);
+        let (folders, cache) = (self.data.folders(), self.data.cache());
+        let sources = Sources::new(folders.iter().map(PathBuf::as_path), &cache, &bar);
+        let bare = Sources::new([], &cache, &bar);
         let context = Context { sources: &sources, bare: &bare, seed: experiment.seed };
         let (mut training, mut validation) = (Joined::default(), Joined::default());
         for scene in scenes {
@@ -220,9 +258,7 @@ impl RegressorArgs {
             }
         }
         let encoder = self.encoder.clone();
-        let definition = self.definition();
-        let (training, validation) =
-            (training.pairs(every, definition)?, validation.pairs(every, definition)?);
+        let (training, validation) = (training.pairs(self, every)?, validation.pairs(self, every)?);
         Ok(Material { training, validation, encoder })
     }
 }
@@ -249,11 +285,11 @@ impl Joined {
         Ok(())
     }
 
-    fn pairs(self, every: usize, definition: Definition) -> anyhow::Result<Pairs> {
+    fn pairs(self, args: &RegressorArgs, every: usize) -> anyhow::Result<Pairs> {
         let dim = self.values.len() / self.poses.len().max(1);
         let rows = ndarray::Array2::from_shape_vec((self.poses.len(), dim), self.values)?;
         let map = Map::new(vpr_core::Descriptors::new(rows)?, Poses::SixDof(self.poses))?;
-        Ok(Pairs::following(map, &self.sequences, every, definition)?)
+        Ok(args.pairs(map, &self.sequences, every)?)
     }
 }
 

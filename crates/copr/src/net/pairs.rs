@@ -8,7 +8,7 @@ use vpr_core::{Definition, Error as CoreError, Map, map::BlockDigest};
 use vpr_nets::regress::RELATIVE_POSE;
 
 use super::relative_pose;
-use crate::Result;
+use crate::{Result, rotation_error, translation_error};
 
 /// Descriptors with poses, and which of them are an anchor and a target.
 #[derive(Clone, Debug)]
@@ -62,6 +62,52 @@ impl Pairs {
             return Err(CoreError::OutOfRange { what: "row", index, len: map.len() }.into());
         }
         Self::listed(map, pairs, definition)
+    }
+
+    /// Every two images of one sequence, in both orders, that are at most `reach_m` metres and `turn_deg`
+    /// degrees apart: what a grid around an anchor asks for.
+    ///
+    /// # Errors
+    ///
+    /// [`CoreError::Parameter`] if a limit is negative or no number, [`CoreError::OutOfRange`] if a
+    /// sequence ends behind the map; otherwise those of [`Self::following`].
+    pub fn near(
+        map: Map,
+        sequences: &[Range<usize>],
+        (reach_m, turn_deg): (f64, f64),
+        definition: Definition,
+    ) -> Result<Self> {
+        for (name, limit) in [("reach", reach_m), ("turn", turn_deg)] {
+            if !(limit >= 0.0 && limit.is_finite()) {
+                let (value, reason) = (limit.to_string(), "must not be negative");
+                return Err(CoreError::Parameter { name, value, reason }.into());
+            }
+        }
+        let poses = map.poses().six_dof()?;
+        if let Some(rows) = sequences.iter().find(|rows| rows.end > poses.len()) {
+            let (index, len) = (rows.end - 1, poses.len());
+            return Err(CoreError::OutOfRange { what: "row", index, len }.into());
+        }
+        let is_near = |a: usize, b: usize| {
+            translation_error(&poses[a], &poses[b]) <= reach_m
+                && rotation_error(&poses[a], &poses[b]) <= turn_deg
+        };
+        let of_anchor = |(rows, a): (&Range<usize>, usize)| -> Vec<(usize, usize)> {
+            rows.clone().filter(|&b| a != b && is_near(a, b)).map(|b| (a, b)).collect()
+        };
+        let anchors = sequences.iter().flat_map(|rows| rows.clone().map(move |row| (rows, row)));
+        let pairs = anchors.flat_map(of_anchor).collect();
+        Self::listed(map, pairs, definition)
+    }
+
+    /// At most `n` of them, evenly over the list.
+    #[must_use]
+    pub fn thinned(mut self, n: usize) -> Self {
+        let len = self.list.len();
+        if n > 0 && n < len {
+            self.list = (0..n).map(|at| self.list[at * len / n]).collect();
+        }
+        self
     }
 
     /// These pairs of rows: anchor, target.
@@ -187,6 +233,23 @@ mod tests {
         assert!(pairs(9, &sequences(None, 5), 1).is_err());
         assert!(pairs(9, &[0..1, 1..2], 3).is_err());
         assert!(pairs(4, &sequences(None, 5), 3).is_err());
+    }
+
+    #[test]
+    fn near_pairs_go_both_ways_and_stay_in_their_sequence() {
+        let line = |rows: &[Range<usize>], limits| {
+            let map = pairs(6, &sequences(None, 6), 2).unwrap().map;
+            Pairs::near(map, rows, limits, Definition::Corrected)
+        };
+        let found = line(&[0..3, 3..6], (1.0, 0.0)).unwrap();
+        let expected = [(0, 1), (1, 0), (1, 2), (2, 1), (3, 4), (4, 3), (4, 5), (5, 4)];
+        assert_eq!(found.list(), expected);
+        assert_eq!(found.clone().thinned(4).list(), [(0, 1), (1, 2), (3, 4), (4, 5)]);
+        assert_eq!(found.thinned(99).len(), 8);
+        assert!(line(&[0..6], (0.5, 9.0)).is_err(), "none is as near");
+        assert!(line(&[0..7], (1.0, 9.0)).is_err());
+        assert!(line(&[0..6], (f64::NAN, 9.0)).is_err());
+        assert!(line(&[0..6], (1.0, -1.0)).is_err());
     }
 
     #[test]
