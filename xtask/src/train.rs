@@ -40,7 +40,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Network::Btl => ("sue", &["train", "btl"]),
         Network::Stun => ("sue", &["train", "stun"]),
         Network::CoprRegressor => {
-            ("copr", &["train", "regressor", "--experiment", "experiments/waiting/table-6.1.toml"])
+            ("copr", &["train", "regressor", "--experiment", "experiments/table-6.1.toml"])
         }
     };
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());

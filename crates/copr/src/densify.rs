@@ -18,7 +18,7 @@ pub struct Options {
     /// Scales every regressed descriptor to unit length, which the released code does not although
     /// its encoders do (C-1).
     pub renormalise: bool,
-    /// Targets at a time. Changes time and memory, not the result.
+    /// Targets at a time. Changes time and memory, not the result, but for [`crate::Control::Shuffled`].
     pub batch: usize,
 }
 
@@ -44,8 +44,8 @@ pub struct Piece<'a> {
 /// Regresses a descriptor at every target and hands them on piece by piece: memory does not grow
 /// with the number of targets.
 ///
-/// The anchors are rows of `map`. The result is the same for any number of threads and any size of
-/// batch.
+/// The anchors are rows of `map`. The result is the same for any number of threads, and, but for
+/// [`crate::Control::Shuffled`], for any size of batch.
 ///
 /// # Errors
 ///

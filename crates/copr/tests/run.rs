@@ -129,8 +129,7 @@ fn oracle_rows_of_real_poses_are_those_of_an_independent_computation() {
         ("table-6.3", [0.1094, 0.1905, 0.0974, 0.1198, 0.1159, 0.1309, 0.1384]),
     ] {
         // Without the generated rooms.
-        let file =
-            fs::read_to_string(workspace().join(format!("experiments/waiting/{id}.toml"))).unwrap();
+        let file = fs::read_to_string(workspace().join(format!("experiments/{id}.toml"))).unwrap();
         let file = file.replace("encoders = [\"default\"]", "encoders = []");
         let path = dir.path().join(format!("{id}.toml"));
         fs::write(&path, file).unwrap();

@@ -14,7 +14,8 @@ pub enum Control {
     /// Random directions of unit length; as released they were 13 times as long as a descriptor,
     /// so that none was ever retrieved (C-4).
     Random,
-    /// Each target gets the descriptor that another target of its anchor should have.
+    /// Each target gets the descriptor that another should have, one of those that are worked off with
+    /// it: which one depends on the size of a batch.
     Shuffled,
     /// The descriptor of the anchor itself, whatever the pose.
     Copied,
