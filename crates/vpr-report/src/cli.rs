@@ -115,6 +115,9 @@ pub struct OutputArgs {
     /// Also write the page, its CSV and its figure into this folder
     #[arg(long, value_name = "DIR")]
     pub write: Option<PathBuf>,
+    /// Also write the page into this folder as HTML, with a list of all pages in it: `index.html`
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
     /// Compare with the page in this folder and with the expected numbers
     #[arg(long, value_name = "DIR", conflicts_with = "write")]
     pub check: Option<PathBuf>,
@@ -334,6 +337,9 @@ pub fn finish<S>(
     print(&table.render_within(output.format, columns()))?;
     if let Some(folder) = &output.write {
         report.write(experiment, folder)?;
+    }
+    if let Some(folder) = &output.report {
+        report.write_site(experiment, folder)?;
     }
     let Some(folder) = &output.check else { return Ok(Outcome::Success) };
     let Checked { findings, n_compared, n_not_at_hand } =
