@@ -111,7 +111,7 @@ fn bars(html: &str) -> String {
     let rows = html.lines().filter_map(|line| {
         let row = line.split_once("<tr>")?.1.split_once("</tr>")?.0;
         let row = row.replace(" scope=\"col\"", "").replace("</th>", "").replace("</td>", "");
-        let cells = row.replace("<th>", "|").replace("<td>", "|");
+        let cells = row.replace("<th>", "| ").replace("<td>", "| ");
         let plain = cells.replace("&#39;", "'").replace("&quot;", "\"").replace("&lt;", "<");
         Some(plain.replace("&gt;", ">").replace("&amp;", "&") + "|\n")
     });
