@@ -30,7 +30,7 @@ pub(crate) struct Args {
     /// Folder that keeps generated places once they are rendered; `data/worlds` by default
     #[arg(long, env = "VPR_CACHE", value_name = "DIR")]
     cache: Option<PathBuf>,
-    /// Format on stdout: table, csv, json or markdown
+    /// Format on stdout: table, csv, json, markdown or html
     #[arg(long, value_name = "FORMAT", default_value = "table")]
     format: String,
     /// Write the pages in `docs/results`
@@ -39,6 +39,9 @@ pub(crate) struct Args {
     /// Compare with the pages in `docs/results` and with the expected numbers
     #[arg(long, conflicts_with = "write")]
     check: bool,
+    /// Write pages to look at and a list of them, `index.html`, into this folder
+    #[arg(long, value_name = "DIR")]
+    report: Option<PathBuf>,
     /// Measure timings as well; they differ from run to run
     #[arg(long)]
     timings: bool,
@@ -103,6 +106,9 @@ fn reproduce(root: &Path, chapter: &str, ids: &[&str], args: &Args) -> anyhow::R
     if let Some(cache) = &args.cache {
         command.arg("--cache").arg(from_here(cache)?);
     }
+    if let Some(folder) = &args.report {
+        command.arg("--report").arg(from_here(folder)?);
+    }
     for (is_set, flag) in [(args.write, "--write"), (args.check, "--check")] {
         if is_set {
             command.args([flag, "docs/results"]);
@@ -125,7 +131,7 @@ pub(crate) fn workspace_root() -> anyhow::Result<PathBuf> {
 /// all that can be computed. All members of the workspace are selected either way, so that what both
 /// need is built once.
 fn features(chapter: &str, args: &Args) -> &'static [&'static str] {
-    let is_page = args.all || args.write || args.check;
+    let is_page = args.all || args.write || args.check || args.report.is_some();
     if chapter != "bench" || is_page || args.networks {
         return &[];
     }

@@ -13,6 +13,8 @@ use vpr_report::cli;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    quiet: cli::Quiet,
 }
 
 #[derive(Subcommand)]
@@ -35,19 +37,26 @@ enum Command {
     Methods(command::methods::MethodsArgs),
     /// Say everything that is wrong with a dataset folder
     Validate(command::validate::ValidateArgs),
+    #[command(flatten)]
+    Shell(cli::Shell),
 }
 
 fn main() -> ExitCode {
-    cli::main(|| match Cli::parse().command {
-        Command::Run(args) => command::run::run(&args),
-        Command::Evaluate(args) => command::evaluate::run(&args),
-        #[cfg(feature = "networks")]
-        Command::Encode(args) => command::encode::run(&args),
-        Command::List(args) => command::list::run(&args),
-        Command::Map(args) => command::map::run(&args),
-        Command::Match(args) => command::match_images::run(&args),
-        #[cfg(feature = "networks")]
-        Command::Methods(args) => command::methods::run(&args),
-        Command::Validate(args) => command::validate::run(&args),
+    cli::main(|| {
+        let Cli { command, quiet } = Cli::parse();
+        quiet.heed();
+        match command {
+            Command::Run(args) => command::run::run(&args),
+            Command::Evaluate(args) => command::evaluate::run(&args),
+            #[cfg(feature = "networks")]
+            Command::Encode(args) => command::encode::run(&args),
+            Command::List(args) => command::list::run(&args),
+            Command::Map(args) => command::map::run(&args),
+            Command::Match(args) => command::match_images::run(&args),
+            #[cfg(feature = "networks")]
+            Command::Methods(args) => command::methods::run(&args),
+            Command::Validate(args) => command::validate::run(&args),
+            Command::Shell(args) => args.run::<Cli>(),
+        }
     })
 }

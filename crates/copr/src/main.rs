@@ -13,6 +13,8 @@ use vpr_report::cli;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    quiet: cli::Quiet,
 }
 
 #[derive(Subcommand)]
@@ -25,13 +27,20 @@ enum Command {
     Train(command::train::TrainArgs),
     /// Run experiment files and compare them with the numbers of the thesis
     Run(cli::RunArgs),
+    #[command(flatten)]
+    Shell(cli::Shell),
 }
 
 fn main() -> ExitCode {
-    cli::main(|| match Cli::parse().command {
-        Command::Densify(args) => command::densify::run(&args),
-        Command::Localize(args) => command::localize::run(&args),
-        Command::Train(args) => command::train::run(&args),
-        Command::Run(args) => command::run::run(&args),
+    cli::main(|| {
+        let Cli { command, quiet } = Cli::parse();
+        quiet.heed();
+        match command {
+            Command::Densify(args) => command::densify::run(&args),
+            Command::Localize(args) => command::localize::run(&args),
+            Command::Train(args) => command::train::run(&args),
+            Command::Run(args) => command::run::run(&args),
+            Command::Shell(args) => args.run::<Cli>(),
+        }
     })
 }

@@ -15,6 +15,8 @@ use vpr_report::cli;
 struct Args {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    quiet: cli::Quiet,
 }
 
 #[derive(Subcommand)]
@@ -23,11 +25,18 @@ enum Command {
     Train(train::Args),
     /// Recall@1 on worlds it has not seen, and on real datasets at hand
     Validate(validate::Args),
+    #[command(flatten)]
+    Shell(cli::Shell),
 }
 
 fn main() -> ExitCode {
-    cli::main(|| match Args::parse().command {
-        Command::Train(args) => train::run(&args),
-        Command::Validate(args) => validate::run(&args),
+    cli::main(|| {
+        let Args { command, quiet } = Args::parse();
+        quiet.heed();
+        match command {
+            Command::Train(args) => train::run(&args),
+            Command::Validate(args) => validate::run(&args),
+            Command::Shell(args) => args.run::<Args>(),
+        }
     })
 }

@@ -82,6 +82,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let log = Log::new(&args.output.with_extension("log.csv"), &COLUMNS, LOG_EVERY);
     let facts = facts(args);
     let mut run = Run::open(&args.checkpoints, &facts, log)?;
+    cli::resumes(&args.checkpoints);
     let device = vpr_nets::train::device();
     let fresh = seeded(DefaultEncoderConfig::new().init(&device), args.seed);
     let first = batches.get(args.steps);

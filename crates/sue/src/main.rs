@@ -13,6 +13,8 @@ use vpr_report::cli;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    quiet: cli::Quiet,
 }
 
 #[derive(Subcommand)]
@@ -27,14 +29,21 @@ enum Command {
     Train(command::train::TrainArgs),
     /// Run an experiment file and compare it with the numbers of the thesis
     Run(cli::RunArgs),
+    #[command(flatten)]
+    Shell(cli::Shell),
 }
 
 fn main() -> ExitCode {
-    cli::main(|| match Cli::parse().command {
-        Command::Estimate(args) => command::estimate::run(&args),
-        Command::Evaluate(args) => command::evaluate::run(&args),
-        Command::Calibrate(args) => command::calibrate::run(&args),
-        Command::Train(args) => command::train::run(&args),
-        Command::Run(args) => command::run::run(&args),
+    cli::main(|| {
+        let Cli { command, quiet } = Cli::parse();
+        quiet.heed();
+        match command {
+            Command::Estimate(args) => command::estimate::run(&args),
+            Command::Evaluate(args) => command::evaluate::run(&args),
+            Command::Calibrate(args) => command::calibrate::run(&args),
+            Command::Train(args) => command::train::run(&args),
+            Command::Run(args) => command::run::run(&args),
+            Command::Shell(args) => args.run::<Cli>(),
+        }
     })
 }

@@ -271,8 +271,10 @@ fn calibration_says_what_it_promises() {
     let words = success(&world.with("calibrate", &["--estimator", "l2"]));
     assert!(words.contains("No threshold can be promised a precision of 0.95"), "{words}");
     let easy = ["--estimator", "l2", "--precision", "0.05", "--risk", "0.4"];
-    let words = success(&world.with("calibrate", &easy));
+    let words = success(&world.with("calibrate", &[&easy[..], &["--report", "out.html"]].concat()));
     assert!(words.starts_with("Accept "), "{words}");
+    let html = fs::read_to_string(world.path("out.html")).unwrap();
+    assert!(html.contains(words.trim()) && !html.contains("no threshold was given"), "the promise");
     let json = success(
         &world.with("calibrate", &["--false-acceptance", "0.5", "--estimator", "l2", "--json"]),
     );

@@ -1,16 +1,17 @@
 //! What every chapter's command line shares. Behind the `cli` feature.
 #![expect(clippy::print_stderr, reason = "the one place that prints")]
 
+mod progress;
+mod shell;
+
 use std::{
-    io::{BufWriter, ErrorKind, IsTerminal, Write},
+    io::{BufWriter, ErrorKind, Write},
     path::{Path, PathBuf},
     process::ExitCode,
-    sync::Mutex,
 };
 
 use anyhow::bail;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde::de::DeserializeOwned;
 
 use crate::{
@@ -19,8 +20,10 @@ use crate::{
     report,
     table::{Checked, Format, WIDTH},
 };
-use vpr_core::Observer;
 use vpr_files::NewFile;
+
+pub use progress::{Bar, Quiet, progress};
+pub use shell::Shell;
 
 /// What a command concluded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,6 +115,9 @@ pub struct OutputArgs {
     /// Also write the page, its CSV and its figure into this folder
     #[arg(long, value_name = "DIR")]
     pub write: Option<PathBuf>,
+    /// Also write the page into this folder as HTML, with a list of all pages in it: `index.html`
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
     /// Compare with the page in this folder and with the expected numbers
     #[arg(long, value_name = "DIR", conflicts_with = "write")]
     pub check: Option<PathBuf>,
@@ -300,44 +306,12 @@ pub fn note(text: &str) {
     eprintln!("{text}");
 }
 
-/// A progress bar on stderr; invisible if stderr is no terminal or `VPR_NO_PROGRESS` is set.
-#[must_use]
-pub fn progress(what: &str, n: usize) -> ProgressBar {
-    if !std::io::stderr().is_terminal() || std::env::var_os("VPR_NO_PROGRESS").is_some() {
-        return ProgressBar::hidden();
-    }
-    let style = ProgressStyle::with_template("{msg} {bar:30} {pos}/{len} {eta}");
-    let bar = ProgressBar::new(n as u64);
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar.set_message(what.to_owned());
-    bar
-}
-
-/// The progress bar of the work under way, on stderr.
-#[derive(Default)]
-pub struct Bar(Mutex<Option<ProgressBar>>);
-
-impl Bar {
-    fn with(&self, act: impl FnOnce(&mut Option<ProgressBar>)) {
-        // A poisoned lock means another thread panicked: progress no longer matters.
-        if let Ok(mut bar) = self.0.lock() {
-            act(&mut bar);
-        }
-    }
-}
-
-impl Observer for Bar {
-    fn start(&self, what: &str, n: usize) {
-        self.with(|bar| *bar = Some(progress(what, n)));
-    }
-
-    fn step(&self) {
-        self.with(|bar| bar.iter().for_each(|bar| bar.inc(1)));
-    }
-
-    fn end(&self) {
-        self.with(|bar| bar.take().iter().for_each(ProgressBar::finish_and_clear));
-    }
+/// Says, before long work begins, that it may be ended at any time, and how it goes on.
+pub fn resumes(checkpoints: &Path) {
+    note(&format!(
+        "may be ended at any time (Ctrl-C): the same command goes on from {}",
+        checkpoints.display()
+    ));
 }
 
 /// Letters of a line: `COLUMNS`, or what pages have.
@@ -363,6 +337,9 @@ pub fn finish<S>(
     print(&table.render_within(output.format, columns()))?;
     if let Some(folder) = &output.write {
         report.write(experiment, folder)?;
+    }
+    if let Some(folder) = &output.report {
+        report.write_site(experiment, folder)?;
     }
     let Some(folder) = &output.check else { return Ok(Outcome::Success) };
     let Checked { findings, n_compared, n_not_at_hand } =

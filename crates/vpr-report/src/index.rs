@@ -5,10 +5,16 @@ use std::{fs, path::Path};
 
 use vpr_core::{Error, Provenance, Result};
 
-use crate::table::{Cell, read_csv};
+use crate::{
+    figure::escape,
+    table::{Cell, html_document, read_csv},
+};
 
 /// Name of the list.
 pub const FILE: &str = "index.md";
+
+/// Name of the list for a browser.
+pub const HTML: &str = "index.html";
 
 /// What a page says of its agreement, before the numbers.
 const VERDICT: &str = "Against the thesis: ";
@@ -19,6 +25,61 @@ const VERDICT: &str = "Against the thesis: ";
 ///
 /// [`Error::Io`] or [`Error::Format`] for a page or its CSV that cannot be read.
 pub fn index(folder: &Path) -> Result<String> {
+    let entries = entries(folder)?;
+    let lines: String = entries.iter().map(Entry::line).collect();
+    Ok(format!(
+        "# Results\n\nEvery table and figure, where its numbers come from, and how many of those that \
+         the thesis prints read the same. Written with the pages; do not edit.\n\n\
+         | page | what it shows | cells by origin | as the thesis |\n|---|---|---|---|\n{lines}"
+    ))
+}
+
+/// The same list for a browser: pages that have none of HTML are linked as they are.
+///
+/// # Errors
+///
+/// As [`index`].
+pub fn html(folder: &Path) -> Result<String> {
+    let row = |entry: &Entry| {
+        let id = escape(&entry.id);
+        let page = format!("{}.html", entry.id);
+        let is_there = folder.join(&page).is_file();
+        let page = if is_there { escape(&page) } else { format!("{id}.md") };
+        let picture = ["svg", "png"]
+            .into_iter()
+            .find(|it| folder.join(format!("{}.{it}", entry.id)).is_file())
+            .map(|it| {
+                format!("<a href=\"{page}\"><img src=\"{id}.{it}\" alt=\"\" width=\"240\"></a>")
+            });
+        format!(
+            "<tr><td><a href=\"{page}\">{id}</a></td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+            escape(&entry.title),
+            escape(&entry.origins),
+            escape(&entry.verdict),
+            picture.unwrap_or_default()
+        )
+    };
+    let rows: String = entries(folder)?.iter().map(row).collect();
+    let head = ["page", "what it shows", "cells by origin", "as the thesis", "picture"];
+    let head: String = head.map(|it| format!("<th scope=\"col\">{it}</th>")).concat();
+    let body = format!(
+        "<p>Every table and figure, where its numbers come from, and how many of those that the \
+         thesis prints read the same.</p>\n<div class=\"wide\" tabindex=\"0\"><table>\n\
+         <thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>\n"
+    );
+    Ok(html_document("Results", &body))
+}
+
+/// What the list says of a page.
+struct Entry {
+    id: String,
+    title: String,
+    origins: String,
+    verdict: String,
+}
+
+/// All pages of a folder, in order.
+fn entries(folder: &Path) -> Result<Vec<Entry>> {
     let mut ids = Vec::new();
     for entry in fs::read_dir(folder).map_err(Error::io(folder))? {
         let path = entry.map_err(Error::io(folder))?.path();
@@ -27,13 +88,7 @@ pub fn index(folder: &Path) -> Result<String> {
         ids.extend(id.map(str::to_owned));
     }
     ids.sort_by_key(|id| sort_key(id));
-    let lines = ids.iter().map(|id| line(folder, id)).collect::<Result<Vec<_>>>()?;
-    Ok(format!(
-        "# Results\n\nEvery table and figure, where its numbers come from, and how many of those that \
-         the thesis prints read the same. Written with the pages; do not edit.\n\n\
-         | page | what it shows | cells by origin | as the thesis |\n|---|---|---|---|\n{}",
-        lines.concat()
-    ))
+    ids.iter().map(|id| Entry::read(folder, id)).collect()
 }
 
 /// The line of one page.
@@ -42,17 +97,36 @@ pub fn index(folder: &Path) -> Result<String> {
 ///
 /// As [`index`].
 pub fn line(folder: &Path, id: &str) -> Result<String> {
-    let path = folder.join(format!("{id}.md"));
-    let page = fs::read_to_string(&path).map_err(Error::io(&path))?;
-    let head = page.lines().next().unwrap_or_default().trim_start_matches("# ");
-    let title = head.split_once(": ").map_or(head, |it| it.1);
-    let verdict = page.lines().find_map(|line| line.strip_prefix(VERDICT)).unwrap_or_default();
-    let verdict = verdict.split(" numbers").next().unwrap_or_default();
-    let path = folder.join(format!("{id}.csv"));
-    let cells =
-        if path.try_exists().map_err(Error::io(&path))? { read_csv(&path)? } else { Vec::new() };
-    let title = title.replace('|', "\\|");
-    Ok(format!("| [{id}]({id}.md) | {title} | {} | {verdict} |\n", origins(&cells)))
+    Ok(Entry::read(folder, id)?.line())
+}
+
+impl Entry {
+    fn read(folder: &Path, id: &str) -> Result<Self> {
+        let path = folder.join(format!("{id}.md"));
+        let page = fs::read_to_string(&path).map_err(Error::io(&path))?;
+        let head = page.lines().next().unwrap_or_default().trim_start_matches("# ");
+        let title = head.split_once(": ").map_or(head, |it| it.1);
+        let verdict = page.lines().find_map(|line| line.strip_prefix(VERDICT)).unwrap_or_default();
+        let verdict = verdict.split(" numbers").next().unwrap_or_default();
+        let path = folder.join(format!("{id}.csv"));
+        let cells = if path.try_exists().map_err(Error::io(&path))? {
+            read_csv(&path)?
+        } else {
+            Vec::new()
+        };
+        Ok(Self {
+            id: id.to_owned(),
+            title: title.to_owned(),
+            origins: origins(&cells),
+            verdict: verdict.to_owned(),
+        })
+    }
+
+    fn line(&self) -> String {
+        let Self { id, origins, verdict, .. } = self;
+        let title = self.title.replace('|', "\\|");
+        format!("| [{id}]({id}.md) | {title} | {origins} | {verdict} |\n")
+    }
 }
 
 fn origins(cells: &[Cell]) -> String {
@@ -104,5 +178,15 @@ mod tests {
             ]
         );
         assert!(line(folder.path(), "nowhere").is_err());
+        write("table-3.9.html", "");
+        write("figure-3.1.svg", "");
+        let html = html(folder.path()).unwrap();
+        for part in [
+            "<a href=\"table-3.9.html\">table-3.9</a></td><td>Sizes</td><td>1 measured, 1 absent</td><td>1 of 2",
+            "<a href=\"table-3.10.md\">",
+            "<img src=\"figure-3.1.svg\"",
+        ] {
+            assert!(html.contains(part), "{part}: {html}");
+        }
     }
 }

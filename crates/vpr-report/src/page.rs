@@ -9,7 +9,10 @@ use crate::{
     experiment::Experiment,
     figure::Figure,
     index,
-    table::{Cell, Checked, Drawings, Finding, Table, check, csv_page, markdown_page, read_csv},
+    table::{
+        Cell, Checked, Drawings, Finding, Table, check, csv_page, html_page, markdown_page,
+        read_csv,
+    },
 };
 
 /// How far a coordinate of a drawing may be from the committed one, in pixels.
@@ -71,6 +74,18 @@ impl Report {
             replace(&path("png"), &sheet.png)?;
         }
         Ok(replace(&folder.join(index::FILE), index::index(folder)?.as_bytes())?)
+    }
+
+    /// Writes what [`Self::write`] does, and the page and the list for a browser too.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::write`].
+    pub fn write_site<S>(&self, experiment: &Experiment<S>, folder: &Path) -> Result<()> {
+        self.write(experiment, folder)?;
+        let text = html_page(&self.table, &experiment.source, self.drawings());
+        replace(&folder.join(format!("{}.html", self.table.id)), text.as_bytes())?;
+        Ok(replace(&folder.join(index::HTML), index::html(folder)?.as_bytes())?)
     }
 
     /// Compares with the committed files in a folder and with the expected numbers.

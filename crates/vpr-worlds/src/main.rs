@@ -23,6 +23,8 @@ struct Args {
     data: PathBuf,
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    quiet: cli::Quiet,
 }
 
 #[derive(Subcommand)]
@@ -48,6 +50,8 @@ enum Command {
         #[arg(long, value_name = "N", default_value_t = 9)]
         queries: usize,
     },
+    #[command(flatten)]
+    Shell(cli::Shell),
 }
 
 #[derive(ClapArgs)]
@@ -77,6 +81,7 @@ impl Which {
 fn main() -> ExitCode {
     cli::main(|| {
         let args = Args::parse();
+        args.quiet.heed();
         let roots = DataRoots::new([args.data]);
         match args.command {
             Command::List => {
@@ -102,6 +107,7 @@ fn main() -> ExitCode {
                 replace(&output, bytes.get_ref())?;
                 cli::note(&format!("generated: {}", output.display()));
             }
+            Command::Shell(shell) => return shell.run::<Args>(),
         }
         Ok(Outcome::Success)
     })

@@ -166,6 +166,7 @@ impl RegressorArgs {
         let facts = settings.facts(&training, &validation, &encoder);
         let log = settings.log(&output.with_extension("log.csv"));
         let mut run = Run::open(&folder, &facts, log)?;
+        cli::resumes(&folder);
         let pairs = (&training, &validation);
         let network = train(&settings, pairs, &mut run, &folder, (&output, &facts), show)?;
         cli::note(&format!("{}: sha256 {}", output.display(), network.digest()));

@@ -6,9 +6,12 @@ use sue::{
     calibrate::{PrecisionGoal, Scope, calibrate_false_acceptance, calibrate_precision},
 };
 use vpr_core::Judged;
-use vpr_report::cli::{self, Outcome};
+use vpr_report::{
+    cli::{self, Outcome, ReportArgs},
+    report::Run,
+};
 
-use super::{input::InputArgs, threshold::Origin, truth::TruthArgs};
+use super::{input::InputArgs, report, threshold::Origin, truth::TruthArgs};
 
 /// The promise, and the queries it rests on.
 #[derive(clap::Args)]
@@ -33,6 +36,8 @@ pub(crate) struct CalibrateArgs {
     input: InputArgs,
     #[command(flatten)]
     truth: TruthArgs,
+    #[command(flatten)]
+    report: ReportArgs,
     /// Print one JSON object instead of a sentence; `sue estimate --threshold FILE` reads it
     #[arg(long)]
     json: bool,
@@ -54,9 +59,9 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
     let judged = Judged::new(&retrieval.best(), &truth)?;
     let prepared = args.estimator.prepare(&input.settings, input.poses.as_ref())?;
     let uncertainty = prepared.estimate(&retrieval)?;
-    let (words, object) = if let Some(rate) = args.false_acceptance {
+    let (words, object, threshold) = if let Some(rate) = args.false_acceptance {
         let result = calibrate_false_acceptance(&uncertainty, judged.correct(), rate)?;
-        (result.to_string(), serde_json::to_value(result)?)
+        (result.to_string(), serde_json::to_value(result)?, result.threshold)
     } else {
         let scope = match args.scope {
             ScopeChoice::Population => Scope::Population,
@@ -64,8 +69,16 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
         };
         let goal = PrecisionGoal { precision: args.precision, risk: args.risk, scope };
         let result = calibrate_precision(&uncertainty, judged.correct(), goal)?;
-        (result.to_string(), serde_json::to_value(result)?)
+        (result.to_string(), serde_json::to_value(result)?, result.threshold)
     };
+    if args.report.path.is_some() {
+        let poses = args.truth.query_poses(&input)?;
+        let limit = report::at_most(threshold, &uncertainty);
+        let run = report::run(prepared.name(), &retrieval, uncertainty);
+        let runs = vec![Run { threshold: Some(limit), ..run }];
+        let promise = Some(("promise", words.as_str()));
+        report::write(&args.report, &input, (poses.as_ref(), &truth), runs, promise)?;
+    }
     if !args.json {
         cli::print(&format!("{words}\n"))?;
         return Ok(Outcome::Success);

@@ -77,7 +77,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     cli::print(&table.render_within(args.format, cli::columns()))?;
     if args.report.path.is_some() {
         let poses = args.truth.query_poses(&input)?;
-        report::write(&args.report, &input, (poses.as_ref(), &truth), runs)?;
+        report::write(&args.report, &input, (poses.as_ref(), &truth), runs, None)?;
     }
     Ok(Outcome::Success)
 }

@@ -1,5 +1,7 @@
-//! The report of `sue evaluate`: the same matches, ordered by every estimator.
+//! The report of `sue evaluate`, the same matches ordered by every estimator, and that of
+//! `sue calibrate`, what a threshold accepts.
 
+use sue::Threshold;
 use vpr_core::{GroundTruth, Poses, Retrieval};
 use vpr_report::{
     cli::{self, ReportArgs},
@@ -31,12 +33,22 @@ pub(super) fn run(estimator: &str, retrieval: &Retrieval, uncertainty: Vec<f64>)
     }
 }
 
-/// Writes the report that the flags ask for.
+/// The largest uncertainty that a threshold accepts: reports accept what is at most theirs. Just below
+/// all of them if it accepts none.
+pub(super) fn at_most(threshold: Threshold, uncertainty: &[f64]) -> f64 {
+    let accepted = uncertainty.iter().copied().filter(|&it| threshold.accepts(it));
+    accepted
+        .reduce(f64::max)
+        .unwrap_or_else(|| uncertainty.iter().copied().fold(f64::INFINITY, f64::min).next_down())
+}
+
+/// Writes the report that the flags ask for, with what else its reader must know.
 pub(super) fn write(
     args: &ReportArgs,
     input: &Input,
     (query_poses, truth): (Option<&Poses>, &GroundTruth),
     runs: Vec<Run>,
+    fact: Option<(&str, &str)>,
 ) -> anyhow::Result<()> {
     let names = |n: usize, names: Option<&vpr_core::map::Names>| {
         (0..n).map(|index| name_of(names, index)).collect()
@@ -50,14 +62,33 @@ pub(super) fn write(
         thumbnails: None,
         similarities: None,
     };
+    let mut facts = vec![
+        ("command".to_owned(), cli::command_line()),
+        ("program".to_owned(), format!("sue {}", env!("CARGO_PKG_VERSION"))),
+    ];
+    facts.extend(fact.map(|(name, text)| (name.to_owned(), text.to_owned())));
     args.write(&Report {
         title: "Uncertainty of matches".to_owned(),
-        facts: vec![
-            ("command".to_owned(), cli::command_line()),
-            ("program".to_owned(), format!("sue {}", env!("CARGO_PKG_VERSION"))),
-        ],
+        facts,
         datasets: vec![dataset],
         runs,
         budget: args.budget(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_report_accepts_what_the_threshold_accepts() {
+        let uncertainty = [3.0, 1.0, 2.0];
+        let of = |threshold| {
+            let limit = at_most(threshold, &uncertainty);
+            uncertainty.map(|it| it <= limit)
+        };
+        assert_eq!(of(Threshold::below(2.0).unwrap()), [false, true, false], "2 is not below 2");
+        assert_eq!(of(Threshold::EVERYTHING), [true; 3]);
+        assert_eq!(of(Threshold::NOTHING), [false; 3]);
+    }
 }

@@ -175,6 +175,7 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<Outcome> {
     let batch = |step| Ok(batches.get(step));
     let log = Training::log(&output.with_extension("log.csv"));
     let mut run = Run::open(&checkpoints, &facts, log)?;
+    cli::resumes(&checkpoints);
     let training = Training { config, steps: args.steps, rate: args.rate(), seed: args.seed };
     match args.learned {
         Learned::Btl => {

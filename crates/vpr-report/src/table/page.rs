@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{Cell, Format, Table, csv_cell::CsvCell, render};
+use crate::figure::escape;
 use vpr_core::{Error, Result};
 
 /// Lines of numbers beyond which a figure's are folded.
@@ -45,6 +46,55 @@ pub fn markdown_page(table: &Table, source: &str, drawings: Drawings<'_>) -> Str
         title = table.title,
     )
 }
+
+/// The page as HTML, to be looked at in a browser; its picture and CSV lie beside it.
+#[must_use]
+pub fn html_page(table: &Table, source: &str, drawings: Drawings<'_>) -> String {
+    let stable = without_timings(table);
+    let (id, title) = (escape(&table.id), escape(&table.title));
+    let picture = |extension: &str| {
+        format!(
+            "<p><a href=\"{id}.{extension}\"><img src=\"{id}.{extension}\" alt=\"{title}\"></a></p>\n"
+        )
+    };
+    let figure = drawings.figure.then(|| picture("svg"));
+    let sheet =
+        drawings.sheet.map(|legend| format!("{}<p>{}</p>\n", picture("png"), escape(legend)));
+    let verdict = match stable.agreement() {
+        (_, 0) => String::new(),
+        (n_agree, n) => {
+            format!("<p>Against the thesis: {n_agree} of {n} numbers read the same.</p>\n")
+        }
+    };
+    let body = format!(
+        "<p>Source: {}. <a href=\"{id}.csv\">All digits</a> · <a href=\"index.html\">all results</a></p>\n\
+         <p>Origins: published, computed from the author's published files; measured, from real \
+         images; generated, from generated images; absent, no data at hand. ✓ reads like the \
+         thesis, ✗ does not.</p>\n{verdict}{}{}",
+        escape(source),
+        figure.into_iter().chain(sheet).collect::<String>(),
+        stable.render(Format::Html),
+    );
+    html_document(&format!("{}: {}", table.id, table.title), &body)
+}
+
+/// A document around a body; readable in light and dark, on paper and on a telephone.
+#[must_use]
+pub fn html_document(title: &str, body: &str) -> String {
+    let title = escape(title);
+    format!(
+        "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n\
+         <title>{title}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<main>\n\
+         <h1>{title}</h1>\n{body}</main>\n</body>\n</html>\n"
+    )
+}
+
+const STYLE: &str = ":root{color-scheme:light dark}\
+    body{font:16px/1.5 system-ui,sans-serif;margin:1rem}main{max-width:75rem;margin:auto}\
+    .wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}\
+    th,td{text-align:left;padding:.2rem .7rem;border-bottom:1px solid #8886;vertical-align:top}\
+    img{max-width:100%;background:#fff}";
 
 /// The cells of a page's CSV, timings left out.
 #[must_use]

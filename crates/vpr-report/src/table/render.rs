@@ -1,9 +1,11 @@
-//! A table as text, CSV, JSON or Markdown.
+//! A table as text, CSV, JSON, Markdown or HTML.
 
 use std::fmt::Write as _;
 
 use comfy_table::{Table as Grid, TableStyle, presets};
 use serde::{Deserialize, Serialize};
+
+use crate::figure::escape;
 
 use super::{
     Cell, Table,
@@ -28,6 +30,8 @@ pub enum Format {
     Json,
     /// A pipe table, for documents.
     Markdown,
+    /// A `<table>`, for pages.
+    Html,
 }
 
 pub(super) fn render(table: &Table, format: Format, width: usize) -> String {
@@ -46,12 +50,39 @@ pub(super) fn render(table: &Table, format: Format, width: usize) -> String {
             let item = if notes.starts_with('[') { "- " } else { "" };
             format!("{blocks}\n{item}{notes}")
         }
+        Format::Html => {
+            let pivot = Pivot::new(table, |text| text + " *");
+            // A browser scrolls; nothing is cut.
+            let grids: String = pivot.blocks(usize::MAX).iter().map(html).collect();
+            let notes: String = notes(&pivot, "*: ")
+                .lines()
+                .filter(|line| !line.is_empty())
+                .map(|line| format!("<p>{}</p>\n", escape(line)))
+                .collect();
+            format!("{grids}{notes}")
+        }
         Format::Csv => csv(table.cells.iter()),
         Format::Json => {
             let json = serde_json::to_string_pretty(table).expect("labels are strings");
             json + "\n"
         }
     }
+}
+
+fn html(block: &Block) -> String {
+    let cells = |tag: &str, cells: &[String]| -> String {
+        cells.iter().map(|it| format!("<{tag}>{}</{tag}>", escape(it))).collect()
+    };
+    let mut text = String::from("<div class=\"wide\" tabindex=\"0\"><table>\n");
+    if let Some(row) = &block.heading {
+        let _ = writeln!(text, "<caption>{}</caption>", escape(row));
+    }
+    let header = cells("th", &block.header).replace("<th>", "<th scope=\"col\">");
+    let _ = writeln!(text, "<thead><tr>{header}</tr></thead>\n<tbody>");
+    for line in &block.lines {
+        let _ = writeln!(text, "<tr>{}</tr>", cells("td", line));
+    }
+    text + "</tbody></table></div>\n"
 }
 
 /// Cells as CSV with a header, one per line.

@@ -106,6 +106,18 @@ fn entries(markdown: &str) -> BTreeMap<(String, String, String), String> {
     entries
 }
 
+/// The rows of HTML tables as lines between bars, as Markdown has them.
+fn bars(html: &str) -> String {
+    let rows = html.lines().filter_map(|line| {
+        let row = line.split_once("<tr>")?.1.split_once("</tr>")?.0;
+        let row = row.replace(" scope=\"col\"", "").replace("</th>", "").replace("</td>", "");
+        let cells = row.replace("<th>", "| ").replace("<td>", "| ");
+        let plain = cells.replace("&#39;", "'").replace("&quot;", "\"").replace("&lt;", "<");
+        Some(plain.replace("&gt;", ">").replace("&amp;", "&") + "|\n")
+    });
+    rows.collect()
+}
+
 /// Whether a printed entry is this value, to the digits that it prints.
 fn reads_like(printed: &str, value: Option<&Value>) -> bool {
     match value {
@@ -129,6 +141,12 @@ fn all_formats_say_the_same_cell_by_cell() {
         assert_eq!(read_csv(&path).unwrap(), table.cells);
         let json: serde_json::Value = serde_json::from_str(&table.render(Format::Json)).unwrap();
         assert_eq!(json["cells"], serde_json::to_value(&table.cells).unwrap());
+        let html = bars(&table.render(Format::Html));
+        assert_eq!(
+            entries(&html),
+            entries(&table.render_within(Format::Markdown, 1000)),
+            "HTML and Markdown"
+        );
         let mut printed = entries(&table.render(Format::Markdown));
         for cell in &table.cells {
             let key = |label: String| (cell.row.clone(), label, cell.column.clone());
