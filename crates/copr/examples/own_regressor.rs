@@ -38,7 +38,9 @@ impl Regressor for Shepard {
                     *out += narrow(weight) * value;
                 }
             }
-            out.iter_mut().for_each(|it| *it /= narrow(total));
+            for value in &mut *out {
+                *value /= narrow(total);
+            }
         }
         Ok(Told::default())
     }

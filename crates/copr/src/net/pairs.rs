@@ -246,10 +246,10 @@ mod tests {
         assert_eq!(found.list(), expected);
         assert_eq!(found.clone().thinned(4).list(), [(0, 1), (1, 2), (3, 4), (4, 5)]);
         assert_eq!(found.thinned(99).len(), 8);
-        assert!(line(&[0..6], (0.5, 9.0)).is_err(), "none is as near");
-        assert!(line(&[0..7], (1.0, 9.0)).is_err());
-        assert!(line(&[0..6], (f64::NAN, 9.0)).is_err());
-        assert!(line(&[0..6], (1.0, -1.0)).is_err());
+        assert!(line(std::slice::from_ref(&(0..6)), (0.5, 9.0)).is_err(), "none is as near");
+        assert!(line(std::slice::from_ref(&(0..7)), (1.0, 9.0)).is_err());
+        assert!(line(std::slice::from_ref(&(0..6)), (f64::NAN, 9.0)).is_err());
+        assert!(line(std::slice::from_ref(&(0..6)), (1.0, -1.0)).is_err());
     }
 
     #[test]

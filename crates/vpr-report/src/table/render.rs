@@ -54,12 +54,11 @@ pub(super) fn render(table: &Table, format: Format, width: usize) -> String {
             let pivot = Pivot::new(table, |text| text + " *");
             // A browser scrolls; nothing is cut.
             let grids: String = pivot.blocks(usize::MAX).iter().map(html).collect();
-            let notes: String = notes(&pivot, "*: ")
-                .lines()
-                .filter(|line| !line.is_empty())
-                .map(|line| format!("<p>{}</p>\n", escape(line)))
-                .collect();
-            format!("{grids}{notes}")
+            let mut text = grids;
+            for line in notes(&pivot, "*: ").lines().filter(|line| !line.is_empty()) {
+                let _ = writeln!(text, "<p>{}</p>", escape(line));
+            }
+            text
         }
         Format::Csv => csv(table.cells.iter()),
         Format::Json => {
@@ -71,7 +70,9 @@ pub(super) fn render(table: &Table, format: Format, width: usize) -> String {
 
 fn html(block: &Block) -> String {
     let cells = |tag: &str, cells: &[String]| -> String {
-        cells.iter().map(|it| format!("<{tag}>{}</{tag}>", escape(it))).collect()
+        cells
+            .iter()
+            .fold(String::new(), |text, it| text + &format!("<{tag}>{}</{tag}>", escape(it)))
     };
     let mut text = String::from("<div class=\"wide\" tabindex=\"0\"><table>\n");
     if let Some(row) = &block.heading {
