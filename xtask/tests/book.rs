@@ -94,13 +94,14 @@ fn run(commands: &str, folder: &Path, page: &Path) -> String {
 /// Whether a text reads as shown; a line `…` stands for any number of lines.
 fn reads_as(printed: &str, shown: &str) -> bool {
     let mut rest: Vec<&str> = printed.lines().collect();
-    let mut parts = shown.split("…\n");
-    let first: Vec<&str> = parts.next().unwrap_or_default().lines().collect();
-    if !rest.starts_with(&first) {
+    let shown: Vec<&str> = shown.lines().collect();
+    let mut parts = shown.split(|line| *line == "…");
+    let first = parts.next().unwrap_or_default();
+    if !rest.starts_with(first) {
         return false;
     }
     rest.drain(..first.len());
-    let parts: Vec<Vec<&str>> = parts.map(|part| part.lines().collect()).collect();
+    let parts: Vec<&[&str]> = parts.collect();
     for (index, part) in parts.iter().enumerate() {
         if index + 1 == parts.len() {
             return rest.ends_with(part);
@@ -119,6 +120,7 @@ fn dots_stand_for_lines() {
     for (shown, is_so) in [
         ("a\nb\nc\n", true),
         ("a\n…\n", true),
+        ("a\nb\nc…\n", false),
         ("…\nc\n", true),
         ("a\n…\nc\n", true),
         ("…\nb\n…\n", true),
@@ -130,6 +132,7 @@ fn dots_stand_for_lines() {
     ] {
         assert_eq!(reads_as("a\nb\nc\n", shown), is_so, "{shown}");
     }
+    assert!(reads_as("a…\nb\n", "a…\nb\n"), "dots at the end of a line are text");
 }
 
 #[test]
