@@ -80,7 +80,7 @@ impl PoseErrors {
     ///
     /// # Errors
     ///
-    /// [`CoreError::Empty`] without queries, those of [`bootstrap`].
+    /// [`CoreError::Empty`] without queries, those of [`vpr_core::metrics::bootstrap`].
     pub fn accuracy(&self, resampling: &Resampling) -> Result<Accuracy> {
         let of = |values: &[f64]| {
             percentile_bootstrap(self.len(), resampling, |queries| median(&pick(values, queries)))

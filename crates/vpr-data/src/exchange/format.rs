@@ -279,7 +279,7 @@ pub fn write(format: Format, path: &Path, parts: &Parts) -> Result<()> {
     }
 }
 
-/// What of these parts [`write`] leaves out, since the format has no place for it.
+/// What of these parts [`write()`] leaves out, since the format has no place for it.
 #[must_use]
 pub fn left_out(format: Format, parts: &Parts) -> Vec<&'static str> {
     use Format::{HlocH5, Kitti, Map, Npy, Npz, Safetensors, SevenScenes, Tum, VprEval};
