@@ -40,7 +40,9 @@ pub(crate) fn run(args: &ValidateArgs) -> anyhow::Result<Outcome> {
         cli::print(&format!("{problem}\n"))?;
     }
     let n_errors = problems.iter().filter(|it| it.severity == Severity::Error).count();
-    cli::note(&format!("{n_errors} errors, {} warnings", problems.len() - n_errors));
+    let counted = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+    let warnings = counted(problems.len() - n_errors, "warning");
+    cli::note(&format!("{}, {warnings}", counted(n_errors, "error")));
     Ok(if n_errors == 0 { Outcome::Success } else { Outcome::Mismatch })
 }
 
