@@ -70,7 +70,7 @@ const KNOWN: [(&str, usize, Mark); 51] = [
     ("BTL", 3, Circle),
     ("STUN", 5, Plus),
     ("SIFT-RANSAC", 1, Circle),
-    ("XFeat-RANSAC", 3, Star),
+    ("XFeat-RANSAC", 2, Star),
     ("DISK-RANSAC", 0, Plus),
     ("Super-RANSAC", 4, Down),
     ("DELF-RANSAC", 7, Star),
