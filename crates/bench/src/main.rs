@@ -21,6 +21,8 @@ enum Command {
     Run(cli::RunArgs),
     /// Say how many queries find a correct reference, from two folders or two descriptor files
     Evaluate(Box<command::evaluate::EvaluateArgs>),
+    /// Say which of several methods differ on the same queries, and how many queries that takes
+    Compare(Box<command::compare::CompareArgs>),
     #[cfg(feature = "networks")]
     /// Describe the images of a folder with a network, and write their map
     Encode(Box<command::encode::EncodeArgs>),
@@ -41,6 +43,7 @@ fn main() -> ExitCode {
     cli::main(|| match Cli::parse().command {
         Command::Run(args) => command::run::run(&args),
         Command::Evaluate(args) => command::evaluate::run(&args),
+        Command::Compare(args) => command::compare::run(&args),
         #[cfg(feature = "networks")]
         Command::Encode(args) => command::encode::run(&args),
         Command::List(args) => command::list::run(&args),

@@ -276,6 +276,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::metrics::bootstrap::Resampling;
 
     proptest! {
         #[test]

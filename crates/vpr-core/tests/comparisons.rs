@@ -77,9 +77,8 @@ fn mcnemar(study: &Study, test: McNemar) -> f64 {
 
 fn auc_pr(study: &Study, n_resamples: usize) -> Difference {
     let known = vec![true; study.correct[0].len()];
-    let judged = [0, 1].map(|it| {
-        Judged::from_flags(study.correct[it].clone(), known.clone()).unwrap()
-    });
+    let judged =
+        [0, 1].map(|it| Judged::from_flags(study.correct[it].clone(), known.clone()).unwrap());
     let [first, second] =
         [0, 1].map(|it| Evaluation::of_confidence(&study.confidence[it], &judged[it]).unwrap());
     let resampling = Resampling { n_resamples, ..Resampling::default() };

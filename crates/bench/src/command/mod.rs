@@ -2,12 +2,15 @@
 
 #[cfg(feature = "networks")]
 mod by_network;
+pub(crate) mod compare;
+mod compared;
 #[cfg(feature = "networks")]
 pub(crate) mod encode;
 #[cfg(feature = "networks")]
 mod encoder;
 pub(crate) mod evaluate;
 mod input;
+mod input_args;
 pub(crate) mod list;
 mod log_folder;
 pub(crate) mod map;

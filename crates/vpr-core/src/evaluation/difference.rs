@@ -87,4 +87,3 @@ impl Evaluation<'_> {
         Ok(area / 2.0 / positives)
     }
 }
-

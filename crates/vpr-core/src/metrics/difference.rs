@@ -75,7 +75,11 @@ impl Difference {
     /// # Errors
     ///
     /// [`crate::Error::Parameter`] if the level or the power is not between 0 and 1.
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of queries")]
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a number of queries"
+    )]
     pub fn queries_for(&self, power: f64, level: f64) -> Result<Option<usize>> {
         between_0_and_1("level", level)?;
         between_0_and_1("power", power)?;
@@ -83,7 +87,8 @@ impl Difference {
             return Ok(None);
         }
         let z = (normal::quantile(1.0 - level / 2.0) + normal::quantile(power)).max(0.0);
-        let queries = (z * self.standard_error / self.interval.estimate).powi(2) * self.n_queries as f64;
+        let queries =
+            (z * self.standard_error / self.interval.estimate).powi(2) * self.n_queries as f64;
         Ok(Some(queries.ceil().max(1.0) as usize))
     }
 }
@@ -105,7 +110,11 @@ mod tests {
         let resampling = Resampling::default();
         let test = paired_test(200, &resampling, mean(&first), mean(&second)).unwrap();
         assert_eq!(test.interval.estimate, 0.5);
-        approx::assert_abs_diff_eq!(test.standard_error, (1.25_f64 / 200.0).sqrt(), epsilon = 0.004);
+        approx::assert_abs_diff_eq!(
+            test.standard_error,
+            (1.25_f64 / 200.0).sqrt(),
+            epsilon = 0.004
+        );
         approx::assert_abs_diff_eq!(test.p_value, 2.0 / 2001.0, epsilon = 1e-12);
         // (1.96 + 0.84)² · 1.25 / 0.25 = 39.2 queries.
         let needed = test.queries_for(0.8, 0.05).unwrap().unwrap();
@@ -119,7 +128,10 @@ mod tests {
         let resampling = Resampling { n_resamples: 100, ..Resampling::default() };
         let same = paired_test(30, &resampling, mean(&values), mean(&values)).unwrap();
         assert_eq!((same.p_value, same.standard_error), (1.0, 0.0));
-        assert_eq!((same.power(1000, 0.05).unwrap(), same.queries_for(0.8, 0.05).unwrap()), (0.0, None));
+        assert_eq!(
+            (same.power(1000, 0.05).unwrap(), same.queries_for(0.8, 0.05).unwrap()),
+            (0.0, None)
+        );
         assert!(same.power(10, 1.0).is_err() && same.queries_for(1.0, 0.05).is_err());
     }
 }
