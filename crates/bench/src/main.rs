@@ -17,6 +17,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Say what may be wrong with a ground truth, and what its radius decides
+    Audit(Box<command::audit::AuditArgs>),
     /// Run an experiment file and compare it with the numbers of the thesis
     Run(cli::RunArgs),
     /// Say how many queries find a correct reference, from two folders or two descriptor files
@@ -41,6 +43,7 @@ enum Command {
 
 fn main() -> ExitCode {
     cli::main(|| match Cli::parse().command {
+        Command::Audit(args) => command::audit::run(&args),
         Command::Run(args) => command::run::run(&args),
         Command::Evaluate(args) => command::evaluate::run(&args),
         Command::Compare(args) => command::compare::run(&args),

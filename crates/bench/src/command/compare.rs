@@ -1,23 +1,20 @@
 //! `bench compare`: several methods on the same queries, and which of them differ.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context as _, bail, ensure};
+use anyhow::ensure;
 use bench::comparison::{Comparison, Found, Metric, Protocol};
 use clap::ValueEnum;
-use vpr_core::{
-    GroundTruth, Provenance,
-    metrics::{McNemar, bootstrap::Resampling},
-};
+use vpr_core::metrics::{McNemar, bootstrap::Resampling};
 use vpr_report::cli::{self, Outcome, ReportArgs};
 
 use super::{
     compared::{self, Compared},
-    input::Input,
     input_args::InputArgs,
     report,
     result::{self, OutputFormat},
     retrieved::Retrieved,
+    several::{Several, refuse_files},
 };
 
 /// Which methods, on what, and how they are compared.
@@ -70,18 +67,16 @@ enum Test {
     Exact,
 }
 
-/// What a method is.
-#[derive(Debug, PartialEq)]
-enum Spec<'a> {
-    Technique(&'a str),
-    Descriptors(&'a str, &'a str),
-    Scores(&'a str),
-}
-
 pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
     args.input.start_threads()?;
     check(args)?;
-    let (found, truth, provenance) = retrieve_all(args)?;
+    let several = Several {
+        methods: &args.methods,
+        input: &args.input,
+        scores_are_distances: args.scores_are_distances,
+        k: args.recall_values.iter().copied().max().unwrap_or(1),
+    };
+    let (found, truth, provenance) = several.retrieve()?;
     let protocol = Protocol {
         metrics: metrics(&args.recall_values),
         test: match args.test {
@@ -142,13 +137,7 @@ fn metrics(recall_values: &[usize]) -> Vec<Metric> {
 
 fn check(args: &CompareArgs) -> anyhow::Result<()> {
     ensure!(args.recall_values.iter().all(|&n| n > 0), "`recall-values` 0: recall@0 is no metric");
-    let input = &args.input;
-    let files = [&input.database_descriptors, &input.similarities, &input.distances];
-    ensure!(
-        files.iter().all(|it| it.is_none()),
-        "`bench compare` takes files as methods: QUERIES,REFERENCES or SIMILARITIES"
-    );
-    ensure!(!input.no_labels, "`no-labels`: nothing can be compared without a truth");
+    refuse_files(&args.input)?;
     if let Some(path) = &args.per_query {
         cli::check_out(path)?;
     }
@@ -166,97 +155,4 @@ fn warn_of_few_resamples(args: &CompareArgs) {
             args.resamples
         ));
     }
-}
-
-/// What every method found, by name, with the one truth.
-#[expect(clippy::type_complexity, reason = "used once")]
-fn retrieve_all(
-    args: &CompareArgs,
-) -> anyhow::Result<(Vec<(String, Retrieved)>, GroundTruth, Provenance)> {
-    let k = args.recall_values.iter().copied().max().unwrap_or(1);
-    let source = args.input.truth.source();
-    let radius = args.input.truth.positive_dist_threshold;
-    let (mut images, mut truth) = (None, None);
-    let mut provenance = Provenance::Measured;
-    if args.input.has_images() {
-        let input = Input::open(&args.input)?;
-        let known = Some(input.truth(source.as_ref(), radius)?);
-        let (input, known) =
-            if args.input.skip_bad { input.without_bad(known)? } else { (input, known) };
-        provenance = input.provenance;
-        (images, truth) = (Some(input), known);
-    }
-    let mut found: Vec<(String, Retrieved)> = Vec::new();
-    for method in &args.methods {
-        let (label, spec) = spec(method);
-        ensure!(found.iter().all(|(name, _)| name != label), "two methods are called `{label}`");
-        let retrieved = match &spec {
-            Spec::Technique(name) => {
-                let Some(input) = images.clone() else {
-                    bail!(
-                        "`{name}` is no file, and as a technique it needs images: give --dataset, or \
-                         --database-folder and --queries-folder"
-                    );
-                };
-                input.retrieve(&args.input, name, k)?
-            }
-            Spec::Descriptors(..) | Spec::Scores(_) => {
-                let flags = flags_of(args, &spec, truth.is_some());
-                let input = Input::open(&flags)?;
-                if truth.is_none() {
-                    truth = Some(input.truth(source.as_ref(), radius)?);
-                }
-                input.retrieve(&flags, label, k)?
-            }
-        };
-        let known = truth.as_ref().context("no truth")?;
-        fits(method, &retrieved, known)?;
-        // Matrices are not kept, but the first for the report.
-        let similarities = retrieved.similarities.filter(|_| found.is_empty());
-        let retrieved = Retrieved { descriptors: None, similarities, ..retrieved };
-        found.push((label.to_owned(), retrieved));
-    }
-    let truth = truth.context("no truth")?;
-    Ok((found, truth, provenance))
-}
-
-fn fits(method: &str, found: &Retrieved, truth: &GroundTruth) -> anyhow::Result<()> {
-    let (queries, references) = (found.queries.len(), found.references.len());
-    let (n, m) = (truth.len(), truth.n_references());
-    ensure!(
-        (queries, references) == (n, m),
-        "`{method}` has {queries} queries and {references} references; the others have {n} and {m}"
-    );
-    Ok(())
-}
-
-/// The flags with which `bench evaluate` would open the files of a method.
-fn flags_of(args: &CompareArgs, spec: &Spec<'_>, has_truth: bool) -> InputArgs {
-    let mut flags = args.input.clone();
-    (flags.dataset, flags.queries_folder, flags.database_folder) = (None, None, None);
-    flags.no_labels = has_truth;
-    match *spec {
-        Spec::Technique(_) => {}
-        Spec::Descriptors(queries, references) => {
-            flags.queries_descriptors = Some(queries.into());
-            flags.database_descriptors = Some(references.into());
-        }
-        Spec::Scores(path) if args.scores_are_distances => flags.distances = Some(path.into()),
-        Spec::Scores(path) => flags.similarities = Some(path.into()),
-    }
-    flags
-}
-
-/// The label of a method, and what it is.
-fn spec(method: &str) -> (&str, Spec<'_>) {
-    let (label, content) = match method.split_once('=') {
-        Some((label, content)) if !Path::new(method).is_file() => (label, content),
-        _ => (method, method),
-    };
-    let spec = match content.split_once(',') {
-        _ if Path::new(content).is_file() => Spec::Scores(content),
-        Some((queries, references)) => Spec::Descriptors(queries, references),
-        None => Spec::Technique(content),
-    };
-    (label, spec)
 }

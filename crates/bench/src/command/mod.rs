@@ -1,5 +1,6 @@
 //! The subcommands: each parses, calls the library and prints.
 
+pub(crate) mod audit;
 #[cfg(feature = "networks")]
 mod by_network;
 pub(crate) mod compare;
@@ -23,4 +24,5 @@ mod report;
 mod result;
 mod retrieved;
 pub(crate) mod run;
+mod several;
 pub(crate) mod validate;
