@@ -83,7 +83,8 @@ pub fn pairs(doubts: &[Doubt]) -> Vec<(usize, usize)> {
 #[must_use]
 pub fn duplicates(references: &Descriptors, queries: &Descriptors) -> Vec<Vec<usize>> {
     let mut groups: BTreeMap<Vec<u32>, Vec<usize>> = BTreeMap::new();
-    let rows = references.view().outer_iter().chain(queries.view().outer_iter());
+    let sides = [references.view(), queries.view()];
+    let rows = sides.iter().flat_map(|side| side.outer_iter());
     let rows: Vec<Vec<u32>> =
         rows.map(|row| row.iter().map(|it| (it + 0.0).to_bits()).collect()).collect();
     for (image, bits) in rows.into_iter().enumerate() {
