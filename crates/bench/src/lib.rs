@@ -17,6 +17,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+pub mod audit;
+pub mod comparison;
 pub mod study;
 
 /// The examples of the README, as tests.

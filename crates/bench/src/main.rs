@@ -19,10 +19,14 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    /// Say what may be wrong with a ground truth, and what its radius decides
+    Audit(Box<command::audit::AuditArgs>),
     /// Run an experiment file and compare it with the numbers of the thesis
     Run(cli::RunArgs),
     /// Say how many queries find a correct reference, from two folders or two descriptor files
     Evaluate(Box<command::evaluate::EvaluateArgs>),
+    /// Say which of several methods differ on the same queries, and how many queries that takes
+    Compare(Box<command::compare::CompareArgs>),
     #[cfg(feature = "networks")]
     /// Describe the images of a folder with a network, and write their map
     Encode(Box<command::encode::EncodeArgs>),
@@ -46,8 +50,10 @@ fn main() -> ExitCode {
         let Cli { command, quiet } = Cli::parse();
         quiet.heed();
         match command {
+            Command::Audit(args) => command::audit::run(&args),
             Command::Run(args) => command::run::run(&args),
             Command::Evaluate(args) => command::evaluate::run(&args),
+            Command::Compare(args) => command::compare::run(&args),
             #[cfg(feature = "networks")]
             Command::Encode(args) => command::encode::run(&args),
             Command::List(args) => command::list::run(&args),

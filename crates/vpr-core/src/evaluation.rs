@@ -1,11 +1,13 @@
 //! Judged matches and how well a confidence or an uncertainty orders them: precision and recall,
 //! risk and coverage, intervals, comparisons.
 
+mod difference;
+
 use crate::{
     Definition, Error, GroundTruth, Result,
     metrics::{
         self, Positives,
-        bootstrap::{Interval, Resampling, paired_bootstrap},
+        bootstrap::Interval,
         effective::{self, Group},
     },
 };
@@ -246,66 +248,6 @@ impl<'a> Evaluation<'a> {
         };
         starts.zip(&self.ends).map(group).collect()
     }
-
-    /// Percentile bootstrap interval of the difference of AUC-PR, this estimator minus another, over
-    /// the same drawn queries; an interval without 0 is a difference beyond the choice of queries.
-    ///
-    /// Both estimators must be about the same matches; recall is relative to the correct ones.
-    ///
-    /// # Errors
-    ///
-    /// [`Error::Mismatch`] if the queries are not equally many, and those of
-    /// [`metrics::bootstrap::paired_bootstrap`].
-    pub fn auc_pr_difference(&self, other: &Self, resampling: &Resampling) -> Result<Interval> {
-        let (expected, actual) = (self.judged.len(), other.judged.len());
-        if expected != actual {
-            let what = "queries of two estimators";
-            return Err(Error::Mismatch { what, expected, actual });
-        }
-        let definition = Definition::Published;
-        let of = |it: &Self, queries: &[usize]| it.resampled(queries, definition);
-        let (first, second) = (|it: &[usize]| of(self, it), |it: &[usize]| of(other, it));
-        paired_bootstrap(expected, resampling, first, second)
-    }
-
-    /// [`metrics::auc_pr`] of drawn queries, without sorting again.
-    fn resampled(&self, queries: &[usize], definition: Definition) -> Result<f64> {
-        let mut counts = vec![0_u32; self.judged.len()];
-        for &query in queries {
-            counts[query] += 1;
-        }
-        let (mut accepted, mut right, mut start) = (0.0, 0.0, 0);
-        // Twice the area times the number of positives, from the artificial point (0, 1).
-        let (mut area, mut precision) = (0.0, 1.0);
-        for &end in &self.ends {
-            let (before, mut drawn) = (right, 0.0);
-            for &query in &self.order[start..end] {
-                let count = f64::from(counts[query]);
-                drawn += count;
-                if self.judged.correct[query] {
-                    right += count;
-                }
-            }
-            start = end;
-            if drawn > 0.0 {
-                accepted += drawn;
-                let here = right / accepted;
-                area += (right - before) * (precision + here);
-                precision = here;
-            }
-        }
-        let positives = match definition {
-            Definition::Published => right,
-            Definition::Corrected => {
-                queries.iter().filter(|&&query| self.judged.known[query]).count() as f64
-            }
-        };
-        if positives == 0.0 {
-            let reason = "no drawn query has a correct match";
-            return Err(Error::Undefined { metric: "the precision-recall curve", reason });
-        }
-        Ok(area / 2.0 / positives)
-    }
 }
 
 /// One finite value per judged query.
@@ -334,6 +276,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::metrics::bootstrap::Resampling;
 
     proptest! {
         #[test]

@@ -6,7 +6,7 @@ use anyhow::bail;
 use vpr_nets::encode::{Encoder, Options, Request, Size, by_request, registry::Method};
 
 /// Which network, and how images are run through it.
-#[derive(clap::Args)]
+#[derive(clap::Args, Clone)]
 pub(crate) struct EncoderArgs {
     /// File of the weights; by default the method's own below the data folder
     #[arg(long, value_name = "FILE")]

@@ -11,12 +11,13 @@ use vpr_study::Sources;
 use vpr_vision::image;
 
 use super::{
-    evaluate::EvaluateArgs,
+    input_args::InputArgs,
     named::{Named, say},
     retrieved::{Retrieved, nearest},
 };
 
 /// Two sides, and what is known of them.
+#[derive(Clone)]
 pub(super) struct Input {
     pub(super) queries: Named,
     pub(super) references: Named,
@@ -28,6 +29,7 @@ pub(super) struct Input {
 }
 
 /// What is compared.
+#[derive(Clone)]
 enum Content {
     /// Image files, which a technique has to describe.
     Images,
@@ -39,7 +41,7 @@ enum Content {
 
 impl Input {
     /// What the flags name.
-    pub(super) fn open(args: &EvaluateArgs) -> anyhow::Result<Self> {
+    pub(super) fn open(args: &InputArgs) -> anyhow::Result<Self> {
         if let Some(id) = &args.dataset {
             return Self::dataset(args, id);
         }
@@ -80,7 +82,7 @@ impl Input {
         Self { queries, references, content, truth: None, provenance: Provenance::Measured }
     }
 
-    fn dataset(args: &EvaluateArgs, id: &str) -> anyhow::Result<Self> {
+    fn dataset(args: &InputArgs, id: &str) -> anyhow::Result<Self> {
         let bar = Bar::default();
         let folders = args.data.folders();
         let folders = folders.iter().map(PathBuf::as_path);
@@ -162,10 +164,15 @@ impl Input {
     }
 
     /// What is retrieved for every query.
-    pub(super) fn retrieve(self, args: &EvaluateArgs, k: usize) -> anyhow::Result<Retrieved> {
+    pub(super) fn retrieve(
+        self,
+        args: &InputArgs,
+        method: &str,
+        k: usize,
+    ) -> anyhow::Result<Retrieved> {
         let Self { queries, references, content, .. } = self;
         match content {
-            Content::Images => args.match_images(queries, references, k),
+            Content::Images => args.match_images(method, queries, references, k),
             Content::Rows([query_rows, reference_rows]) => {
                 let found = nearest(queries, references, query_rows, reference_rows, k);
                 let files = args.queries_descriptors.iter().chain(&args.database_descriptors);

@@ -1,33 +1,33 @@
-//! The report of `bench evaluate`: what was found, to look at.
+//! The report of `bench evaluate` and `bench compare`: what was found, to look at.
 
 use std::path::PathBuf;
 
 use vpr_core::{GroundTruth, Similarities};
 use vpr_report::{
-    cli,
+    cli::{self, ReportArgs},
     report::{Dataset, Match, Report, Run},
 };
 use vpr_study::thumbnails;
 
-use super::{evaluate::EvaluateArgs, retrieved::Retrieved};
+use super::{input_args::InputArgs, retrieved::Retrieved};
 
 /// Largest number of similarities of which a picture is made.
 const MATRIX: usize = 100_000_000;
 
 /// Writes the report that the flags ask for, if any.
 pub(super) fn write(
-    args: &EvaluateArgs,
-    retrieved: &Retrieved,
+    args: &InputArgs,
+    report: &ReportArgs,
+    runs: &[(&str, &Retrieved)],
     truth: Option<&GroundTruth>,
 ) -> anyhow::Result<()> {
-    if args.report.path.is_none() {
+    let Some((_, retrieved)) = runs.first().filter(|_| report.path.is_some()) else {
         return Ok(());
-    }
+    };
     let (queries, references) = (&retrieved.queries, &retrieved.references);
     let pictures = thumbnails(&queries.names, &references.names);
     // Rows of a file of descriptors or scores have no pictures.
-    let has_scores = args.similarities.is_some() || args.distances.is_some();
-    let has_pictures = args.database_descriptors.is_none() && !has_scores;
+    let has_pictures = args.has_images();
     let names = |names: &[PathBuf]| names.iter().map(|it| it.display().to_string()).collect();
     let name = args.dataset.clone().unwrap_or_else(|| "images".to_owned());
     let is_small = |it: &&Similarities| it.n_queries() * it.n_references() <= MATRIX;
@@ -40,36 +40,38 @@ pub(super) fn write(
         thumbnails: if has_pictures { Some(&pictures) } else { None },
         similarities: retrieved.similarities.as_ref().filter(is_small),
     };
-    let matches = |(query, distances): (usize, &Vec<f64>)| {
-        let ranked = retrieved.ranking.indices(query).into_iter().zip(distances);
-        ranked.map(|(&reference, &distance)| Match { reference, distance, inliers: None }).collect()
-    };
-    let is_similarity = retrieved.similarities.is_some();
-    let run = Run {
-        name: match (has_pictures, has_scores) {
-            (true, _) => args.method.clone(),
-            (_, true) => "scores".to_owned(),
-            _ => "descriptors".to_owned(),
-        },
-        matches: retrieved.distances.iter().enumerate().map(matches).collect(),
-        estimator: is_similarity.then(|| "negative similarity of the best match".to_owned()),
-        ..Run::default()
-    };
-    args.report.write(&Report {
-        title: format!("{} on {}", run.name, dataset.name),
+    let names: Vec<&str> = runs.iter().map(|(name, _)| *name).collect();
+    let runs = names.iter().zip(runs).map(|(name, (_, retrieved))| run(name, retrieved)).collect();
+    report.write(&Report {
+        title: format!("{} on {}", names.join(", "), dataset.name),
         facts: vec![
             ("command".to_owned(), cli::command_line()),
             ("protocol".to_owned(), protocol(args, truth)),
             ("program".to_owned(), format!("bench {}", env!("CARGO_PKG_VERSION"))),
         ],
         datasets: vec![dataset],
-        runs: vec![run],
-        budget: args.report.budget(),
+        runs,
+        budget: report.budget(),
     })
 }
 
+/// What one method found.
+fn run(name: &str, retrieved: &Retrieved) -> Run {
+    let matches = |(query, distances): (usize, &Vec<f64>)| {
+        let ranked = retrieved.ranking.indices(query).into_iter().zip(distances);
+        ranked.map(|(&reference, &distance)| Match { reference, distance, inliers: None }).collect()
+    };
+    let is_similarity = retrieved.similarities.is_some();
+    Run {
+        name: name.to_owned(),
+        matches: retrieved.distances.iter().enumerate().map(matches).collect(),
+        estimator: is_similarity.then(|| "negative similarity of the best match".to_owned()),
+        ..Run::default()
+    }
+}
+
 /// Which references count as correct.
-fn protocol(args: &EvaluateArgs, truth: Option<&GroundTruth>) -> String {
+fn protocol(args: &InputArgs, truth: Option<&GroundTruth>) -> String {
     match (truth, args.truth.source(), &args.dataset) {
         (None, ..) => "nothing is judged".to_owned(),
         (_, Some(source), _) => format!("correct references: {source}"),

@@ -68,6 +68,32 @@ pub fn percentile_bootstrap(
     resampling: &Resampling,
     statistic: impl Fn(&[usize]) -> Result<f64> + Sync,
 ) -> Result<Interval> {
+    Ok(resample(n_queries, resampling, statistic)?.interval(resampling.level))
+}
+
+/// A statistic of all queries, and of every resample that has one.
+pub(super) struct Resampled {
+    pub(super) estimate: f64,
+    /// Ascending, at least one.
+    pub(super) values: Vec<f64>,
+    pub(super) n_undefined: usize,
+}
+
+impl Resampled {
+    /// The middle share of the resampled values.
+    pub(super) fn interval(&self, level: f64) -> Interval {
+        let tail = (1.0 - level) / 2.0;
+        let (low, high) = (quantile(tail, &self.values), quantile(1.0 - tail, &self.values));
+        Interval { estimate: self.estimate, low, high, n_undefined: self.n_undefined }
+    }
+}
+
+/// What [`percentile_bootstrap`] resamples, with its errors.
+pub(super) fn resample(
+    n_queries: usize,
+    resampling: &Resampling,
+    statistic: impl Fn(&[usize]) -> Result<f64> + Sync,
+) -> Result<Resampled> {
     check(n_queries, resampling)?;
     let all: Vec<usize> = (0..n_queries).collect();
     let estimate = finite(0, statistic(&all)?)?;
@@ -89,9 +115,7 @@ pub fn percentile_bootstrap(
         return Err(Error::Undefined { metric: "the bootstrap interval", reason });
     }
     values.sort_unstable_by(f64::total_cmp);
-    let tail = (1.0 - resampling.level) / 2.0;
-    let (low, high) = (quantile(tail, &values), quantile(1.0 - tail, &values));
-    Ok(Interval { estimate, low, high, n_undefined })
+    Ok(Resampled { estimate, values, n_undefined })
 }
 
 /// Percentile bootstrap of the difference `first − second` of two statistics over the *same* drawn queries, as

@@ -26,14 +26,19 @@
 
 mod area;
 mod average;
+mod binomial;
 pub mod bootstrap;
 pub mod catalogue;
 mod correlation;
 mod curve;
+mod difference;
 mod economy;
 pub mod effective;
 mod invariance;
+mod many;
+mod mcnemar;
 mod median;
+mod normal;
 mod operating_point;
 mod platform;
 mod recall;
@@ -45,8 +50,11 @@ pub use area::auc;
 pub use average::mean_average_precision;
 pub use correlation::spearman;
 pub use curve::{Positives, PrecisionRecall, auc_pr, average_precision, precision_recall_curve};
+pub use difference::{Difference, paired_test};
 pub use economy::{EncodingReference, Platform, RealTimeMatches, pcu, rmf};
 pub use invariance::area_between_curves;
+pub use many::holm;
+pub use mcnemar::{Discordant, MOST_QUERIES, McNemar, Plan};
 pub use median::median;
 pub use operating_point::{
     accuracy, extended_precision, f1_curve, f1_max, precision_at_full_recall, recall_at_precision,
