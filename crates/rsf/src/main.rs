@@ -1,0 +1,3 @@
+//! `rsf`: an encoder that has read its map, on the command line.
+
+fn main() {}
