@@ -28,10 +28,20 @@
 
 pub mod augmentation;
 mod error;
+pub mod gap;
 mod mining;
+#[cfg(feature = "networks")]
+pub mod net;
 mod reference_set;
+#[cfg(feature = "study")]
+pub mod study;
 
 pub use augmentation::{Augmentation, Augmentations, Operation, Preset};
 pub use error::{Error, Result};
 pub use mining::{Mined, MiningParams, Triplet};
 pub use reference_set::{ReferenceSet, Split};
+
+/// The examples of the README, as tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+pub struct Readme;
