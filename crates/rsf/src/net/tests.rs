@@ -156,6 +156,7 @@ fn steps_pull_a_trial_apart() {
         steps: 20,
         batch: 4,
         rate: 3e-4,
+        variants: 6,
         augmentations: Preset::Appearance,
         trial: Preset::Appearance,
         ..settings()

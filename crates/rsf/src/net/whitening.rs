@@ -62,7 +62,7 @@ pub fn whiten(
         parts.push(network.pooled(&material.changed(&augmentations, &drawn)?, INPUT, BATCH)?);
         places.extend(drawn.iter().map(|it| it.0));
     }
-    let views: Vec<_> = parts.iter().map(ndarray::Array2::view).collect();
+    let views: Vec<_> = parts.iter().map(|part| part.view()).collect();
     let features = concatenate(Axis(0), &views)
         .map_err(|cause| vpr_core::Error::format("features", "shape", cause.to_string()))?;
     let dimension = network.dimension();
