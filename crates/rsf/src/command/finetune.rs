@@ -157,6 +157,8 @@ fn verdict(tuned: &Tuned) -> String {
 
 #[expect(clippy::unnecessary_wraps, reason = "what fine-tuning calls")]
 fn show(step: usize, loss: f64, score: Score) -> vpr_core::Result<()> {
-    cli::note(&format!("step {step}: loss {loss:.4}, {}", told(score)));
+    // Before the first step there is no loss.
+    let loss = if step == 0 { String::new() } else { format!("loss {loss:.4}, ") };
+    cli::note(&format!("step {step}: {loss}{}", told(score)));
     Ok(())
 }
