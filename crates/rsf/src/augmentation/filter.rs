@@ -51,7 +51,9 @@ fn motion_kernel(width: usize, degrees: f64, direction: f64) -> Kernel {
         }
     }
     let sum: f64 = values.iter().sum();
-    values.iter_mut().for_each(|value| *value /= sum);
+    for value in &mut values {
+        *value /= sum;
+    }
     Kernel { width, values }
 }
 

@@ -192,6 +192,7 @@ impl Change {
     }
 
     /// Draws its numbers for an image of this width and height.
+    #[expect(clippy::too_many_lines, reason = "a short arm for each change")]
     pub fn draw(&self, size: (usize, usize), random: &mut impl Rng) -> Operation {
         let [width, height] = [size.0, size.1].map(|it| it as f64);
         match *self {

@@ -226,7 +226,9 @@ impl Operation {
                 for plane in image.planes_mut() {
                     for (number, row) in plane.chunks_mut(columns).enumerate() {
                         let veil = density * (1.0 - 0.7 * number as f64 / rows as f64);
-                        row.iter_mut().for_each(|it| *it += veil * (grey - *it));
+                        for it in row.iter_mut() {
+                            *it += veil * (grey - *it);
+                        }
                     }
                 }
             }
