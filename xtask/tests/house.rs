@@ -13,7 +13,7 @@ use std::{
 use serde_json::Value;
 
 /// Every package with those of the workspace that it may depend on; dependencies of tests aside.
-const ARROWS: [(&str, &[&str]); 13] = [
+const ARROWS: [(&str, &[&str]); 14] = [
     ("vpr-files", &[]),
     ("vpr-core", &["vpr-files"]),
     ("vpr-data", &["vpr-core", "vpr-files"]),
@@ -40,6 +40,7 @@ const ARROWS: [(&str, &[&str]); 13] = [
     ("vpr-bench", CHAPTER),
     ("vpr-sue", CHAPTER),
     ("vpr-copr", CHAPTER),
+    ("vpr-rsf", CHAPTER),
     ("xtask", &[]),
 ];
 
@@ -57,7 +58,7 @@ const CHAPTER: &[&str] = &[
 
 /// Packages that only some may name.
 const RESERVED: [(&str, &[&str]); 4] = [
-    ("burn", &["vpr-nets", "vpr-sue", "vpr-copr"]),
+    ("burn", &["vpr-nets", "vpr-sue", "vpr-copr", "vpr-rsf"]),
     ("kornia-image", &["vpr-vision"]),
     ("kornia-imgproc", &["vpr-vision"]),
     ("hdf5-pure", &["vpr-data"]),

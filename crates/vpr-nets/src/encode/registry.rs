@@ -236,6 +236,18 @@ impl Method {
         found.map(Place::File).or_else(built_in)
     }
 
+    /// The weights that are part of the program, of the method that has some.
+    ///
+    /// # Errors
+    ///
+    /// [`Error::Empty`] for every other method.
+    pub fn built_in_weights(&self) -> Result<Weights> {
+        if self.architecture != Architecture::Default {
+            return Err(Error::Empty("built-in weights").into());
+        }
+        Weights::read(self.file(self.dimensions[0]).as_ref(), DEFAULT_ENCODER)
+    }
+
     /// What [`Self::locate`] finds, read; or why it is not there.
     pub(super) fn weights(
         &self,
@@ -268,7 +280,7 @@ impl Method {
         })?;
         match place {
             Place::File(path) => Weights::open(&path),
-            Place::BuiltIn => Weights::read(self.file(dimension).as_ref(), DEFAULT_ENCODER),
+            Place::BuiltIn => self.built_in_weights(),
         }
     }
 

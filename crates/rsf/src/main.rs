@@ -1,0 +1,37 @@
+//! `rsf`: an encoder that has read its map, on the command line.
+
+mod command;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use vpr_report::cli;
+
+/// RSF, chapter 4: fine-tuning on the references of a map, before any query is seen.
+#[derive(Parser)]
+#[command(version, about, propagate_version = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Adapt the default network to a map; a killed run goes on where it stopped
+    Finetune(Box<command::finetune::FinetuneArgs>),
+    /// Say how far a map is from what the network was trained on, and whether tuning may pay
+    Gap(Box<command::gap::GapArgs>),
+    /// Draw what fine-tuning makes of an image
+    Augment(command::augment::AugmentArgs),
+    /// Run experiment files and compare them with the numbers of the thesis
+    Run(cli::RunArgs),
+}
+
+fn main() -> ExitCode {
+    cli::main(|| match Cli::parse().command {
+        Command::Finetune(args) => command::finetune::run(&args),
+        Command::Gap(args) => command::gap::run(&args),
+        Command::Augment(args) => command::augment::run(&args),
+        Command::Run(args) => command::run::run(&args),
+    })
+}

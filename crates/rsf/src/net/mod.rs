@@ -1,0 +1,18 @@
+//! Fine-tuning of the default network on a map, and what is cheaper.
+
+mod finetune;
+mod lessons;
+mod material;
+mod parts;
+mod student;
+#[cfg(test)]
+mod tests;
+mod trial;
+mod whitening;
+
+pub use finetune::{Finetuning, Outcome, finetune, run_log};
+pub use lessons::{Lessons, TripletBatch};
+pub use material::{Material, default_network};
+pub use student::Student;
+pub use trial::{Score, Trial};
+pub use whitening::{Whitening, whiten};

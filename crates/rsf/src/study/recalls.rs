@@ -1,0 +1,122 @@
+//! Recall@N of the default network with several weights.
+
+use std::{path::Path, sync::Arc};
+
+use vpr_core::metrics::bootstrap::{Z_95, wilson_interval};
+use vpr_data::Dataset;
+use vpr_nets::encode::by_name;
+use vpr_report::table::{Cell, Table};
+use vpr_study::{Direction, Network, Runner, Sources};
+
+use super::{Encoder, Place, mcnemar};
+use crate::Result;
+
+pub(super) fn run(
+    table: &mut Table,
+    places: &[Place],
+    (encoders, ranks): (&[Encoder], &[usize]),
+    sources: &Sources<'_>,
+) -> Result<()> {
+    for place in places {
+        let dataset = sources.images(&place.dataset)?;
+        let mut baseline: Option<Vec<Vec<bool>>> = None;
+        for encoder in encoders {
+            let columns = ranks.iter().map(|rank| column(place, *rank, ranks.len()));
+            let found = match &dataset {
+                None => Err(sources.why_absent(&place.dataset, "images")?),
+                Some(dataset) => hits(place, encoder, (dataset.as_ref(), ranks), sources)?,
+            };
+            let (Some(dataset), Ok(found)) = (&dataset, &found) else {
+                let why = found.err().unwrap_or_default();
+                columns.for_each(|it| table.push(Cell::absent(&encoder.name, it, &why)));
+                continue;
+            };
+            for (number, (column, hits)) in columns.zip(found).enumerate() {
+                let n_hits = hits.iter().filter(|hit| **hit).count();
+                let interval = wilson_interval(n_hits, hits.len(), Z_95)?;
+                let cell = Cell::new(
+                    &encoder.name,
+                    column,
+                    interval.estimate,
+                    dataset.provenance,
+                    hits.len(),
+                );
+                let cell = cell.within(interval.low, interval.high, "Wilson");
+                table.push(match &baseline {
+                    Some(before) => cell.noted(difference(&before[number], hits, encoders)),
+                    None => cell,
+                });
+            }
+            if baseline.is_none() {
+                baseline = Some(found.clone());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn column(place: &Place, rank: usize, n_ranks: usize) -> String {
+    if n_ranks == 1 { place.name.clone() } else { format!("{} R@{rank}", place.name) }
+}
+
+/// What a reader must know of a cell beside that of the first encoder.
+fn difference(before: &[bool], after: &[bool], encoders: &[Encoder]) -> String {
+    let only = |this: &[bool], other: &[bool]| {
+        this.iter().zip(other).filter(|(this, other)| **this && !**other).count()
+    };
+    let (gained, lost) = (only(after, before), only(before, after));
+    let points = 100.0 * (gained as f64 - lost as f64) / before.len().max(1) as f64;
+    let p = mcnemar(gained, lost);
+    let first = encoders.first().map_or("", |it| it.name.as_str());
+    format!(
+        "{points:+.1} points on {first}: {gained} queries gained, {lost} lost, McNemar p {p:.2e}"
+    )
+}
+
+/// For each rank, for each query that has a correct reference, whether one is among the best; or why
+/// that cannot be said.
+fn hits(
+    place: &Place,
+    encoder: &Encoder,
+    (dataset, ranks): (&Dataset, &[usize]),
+    sources: &Sources<'_>,
+) -> Result<Result<Vec<Vec<bool>>, String>> {
+    let runner = match adapted(place, encoder, sources)? {
+        Ok(runner) => runner,
+        Err(why) => return Ok(Err(why)),
+    };
+    let scores = sources.scores(&runner, dataset, Direction::AsReleased)?;
+    let ranking = scores.ranking()?;
+    let known = (0..dataset.truth.len()).filter(|&query| !dataset.truth.is_new_place(query));
+    let is_hit = |query: usize, rank: usize| {
+        let best = ranking.indices(query);
+        best.iter().take(rank).any(|&reference| dataset.truth.is_correct(query, reference))
+    };
+    let of = |&rank: &usize| known.clone().map(|query| is_hit(query, rank)).collect();
+    Ok(Ok(ranks.iter().map(of).collect()))
+}
+
+/// The default network with the weights of a row, as a technique.
+fn adapted(
+    place: &Place,
+    encoder: &Encoder,
+    sources: &Sources<'_>,
+) -> Result<Result<Runner, String>> {
+    let path = match &encoder.weights {
+        None => None,
+        Some(weights) => {
+            let weights = weights.replace("{place}", &place.key);
+            let Some(path) = sources.locate(Path::new(&weights))? else {
+                return Ok(Err(format!("{weights} is not at hand; `rsf finetune` makes it")));
+            };
+            Some(path)
+        }
+    };
+    let network = by_name("default", path.as_deref(), &sources.roots().roots)?;
+    Ok(Ok(Runner {
+        name: encoder.name.clone(),
+        column: "default network",
+        encoder: encoder.name.clone(),
+        technique: Arc::new(Network::new(network.into())),
+    }))
+}
