@@ -1,9 +1,6 @@
 //! Training of H on descriptors of a frozen encoder.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::path::Path;
 
 use burn::{
     module::Module,
@@ -16,13 +13,14 @@ use vpr_nets::{
     weights::{self, Precision, Weights},
 };
 
-use super::{NetworkRegressor, PairBatch, Pairs};
+use super::{
+    NetworkRegressor, PairBatch, Pairs,
+    best::{best, keep_if_best},
+};
 use crate::Result;
 
 /// What the released loss multiplies the mean squared error by (C-6).
 const SCALE: f64 = 1000.0;
-/// What the network with the lowest validation loss so far is called; step and loss follow.
-const BEST: &str = "best-";
 
 /// How to train; the numbers by default are the released ones but for the length.
 #[derive(Clone, Debug, PartialEq)]
@@ -203,46 +201,10 @@ impl Learner for Pupil {
     }
 }
 
-/// Keeps a network if none is better. One that a killed run had reached after its last checkpoint is
-/// reached again, with the same loss.
-fn keep_if_best(
-    folder: &Path,
-    step: usize,
-    loss: f64,
-    network: &DescriptorRegressor,
-) -> vpr_core::Result<()> {
-    let before = best(folder)?;
-    if before.as_ref().is_some_and(|&(_, lowest, _)| loss >= lowest) {
-        return Ok(());
-    }
-    let path = folder.join(format!("{BEST}{step}-{:016x}.safetensors", loss.to_bits()));
-    weights::save(network, &path, &[], Precision::Single)
-        .map_err(|err| CoreError::format(&path, "weights", err.to_string()))?;
-    if let Some((_, _, old)) = before {
-        fs::remove_file(&old).map_err(CoreError::io(&old))?;
-    }
-    Ok(())
-}
-
-/// Step, validation loss and file of the best network in a folder.
-fn best(folder: &Path) -> vpr_core::Result<Option<(usize, f64, PathBuf)>> {
-    let mut all = Vec::new();
-    for entry in fs::read_dir(folder).map_err(CoreError::io(folder))? {
-        let path = entry.map_err(CoreError::io(folder))?.path();
-        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-        let parts = name.strip_prefix(BEST).and_then(|name| name.strip_suffix(".safetensors"));
-        let parsed = parts.and_then(|parts| {
-            let (step, bits) = parts.split_once('-')?;
-            let loss = f64::from_bits(u64::from_str_radix(bits, 16).ok()?);
-            Some((step.parse::<usize>().ok()?, loss))
-        });
-        all.extend(parsed.map(|(step, loss)| (step, loss, path)));
-    }
-    Ok(all.into_iter().min_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0))))
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use ndarray::Array2;
     use vpr_core::{Descriptors, Map, Pose, Poses};
 

@@ -9,6 +9,7 @@ use vpr_worlds::{Side, World, named_recipe};
 use super::{
     Context, Method, Place,
     dense::{joined, localize},
+    encoder,
     methods::Setting,
     place::Aside,
     rows::Row,
@@ -31,7 +32,7 @@ pub(super) fn run(
             definition,
             note,
         };
-        let runner = match context.sources.find(&place.encoder)? {
+        let runner = match encoder::find(&place.encoder, context.sources)? {
             Found::Runs(runner) => runner,
             Found::Absent(why) => {
                 row("sparse map", None, None).push_absent(table, &why);

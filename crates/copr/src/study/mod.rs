@@ -1,6 +1,7 @@
 //! What an experiment file of chapter 6 can ask for, one file per study.
 
 mod dense;
+mod encoder;
 mod encoders;
 mod extrapolation;
 mod interpolation;
@@ -21,6 +22,7 @@ use vpr_report::{
 use vpr_study::Sources;
 
 pub use dense::Method;
+pub use encoder::encoder_weights;
 pub use place::{Aside, Place};
 pub use rooms::{Paths, Room, Rooms, Scene, Side};
 

@@ -1,12 +1,13 @@
 //! Generated rooms that take the part of the seven scenes, as an encoder sees them.
 
-use std::{ops::Range, path::PathBuf};
+use std::{ops::Range, path::PathBuf, sync::Arc};
 
 use serde::{Deserialize, Serialize};
 use vpr_core::{Error as CoreError, Map};
+use vpr_data::Dataset;
 use vpr_study::technique::Found;
 
-use super::{Context, real};
+use super::{Context, encoder, real};
 use crate::Result;
 
 /// One of the seven scenes.
@@ -105,6 +106,28 @@ impl Rooms {
         format!("{encoder}, {}", paths.name())
     }
 
+    /// The images of a room, rendered where they are not, or why they cannot be.
+    ///
+    /// # Errors
+    ///
+    /// Images that cannot be rendered.
+    pub fn images(
+        &self,
+        scene: &Scene,
+        paths: Paths,
+        context: Context<'_>,
+    ) -> Result<Result<Arc<Dataset>, String>> {
+        let sources = match paths {
+            Paths::Own => context.bare,
+            Paths::Real if real::RealScene::open(scene, context.sources)?.is_none() => {
+                return Ok(Err(context.sources.why_absent("7scenes-poses", "poses")?));
+            }
+            Paths::Real => context.sources,
+        };
+        let none = || CoreError::Empty("images of a generated room");
+        Ok(Ok(sources.images(&self.world(scene))?.ok_or_else(none)?))
+    }
+
     /// A room, or why it is not at hand.
     ///
     /// # Errors
@@ -123,20 +146,15 @@ impl Rooms {
             let (name, known) = (scene.kept.clone(), scene.references.join(", "));
             CoreError::Unknown { kind: "sequence", name, known }
         })?;
-        let sources = match paths {
-            Paths::Own => context.bare,
-            Paths::Real if real::RealScene::open(scene, context.sources)?.is_none() => {
-                return Ok(Err(context.sources.why_absent("7scenes-poses", "poses")?));
-            }
-            Paths::Real => context.sources,
+        let dataset = match self.images(scene, paths, context)? {
+            Ok(dataset) => dataset,
+            Err(why) => return Ok(Err(why)),
         };
-        let runner = match context.sources.find(encoder)? {
+        let runner = match encoder::find(encoder, context.sources)? {
             Found::Runs(runner) => runner,
             Found::Absent(why) => return Ok(Err(why)),
         };
-        let id = self.world(scene);
-        let none = || CoreError::Empty("images of a generated room");
-        let dataset = sources.images(&id)?.ok_or_else(none)?;
+        let none = || CoreError::Empty("poses of a generated room");
         let (query_poses, poses) = dataset.poses.clone().ok_or_else(none)?;
         let describe = |images: &[PathBuf], poses, n_sequences| -> Result<Side> {
             let what = format!("{encoder} on {}", scene.name);

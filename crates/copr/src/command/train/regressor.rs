@@ -1,4 +1,4 @@
-//! `copr train`: the regression network H on descriptors of a frozen encoder.
+//! `copr train regressor`: the regression network H on descriptors of a frozen encoder.
 
 use std::{
     ops::Range,
@@ -8,7 +8,6 @@ use std::{
 };
 
 use anyhow::{bail, ensure};
-use clap::Subcommand;
 use copr::{
     net::{Pairs, Training, train},
     sequences,
@@ -18,31 +17,18 @@ use vpr_core::{
     Definition, Map, Poses,
     map::{OpenMap, Opening},
 };
-use vpr_nets::train::{Report, Run};
+use vpr_nets::train::Run;
 use vpr_report::{
     cli::{self, Bar, DataArgs, Outcome},
     experiment,
 };
 use vpr_study::Sources;
 
-use super::run::CHAPTER;
-
-/// What to train.
-#[derive(clap::Args)]
-pub(crate) struct TrainArgs {
-    #[command(subcommand)]
-    what: What,
-}
-
-#[derive(Subcommand)]
-enum What {
-    /// H: from one anchor and a relative pose to a descriptor
-    Regressor(Box<RegressorArgs>),
-}
+use super::{super::run::CHAPTER, show};
 
 /// Pairs, settings and output.
 #[derive(clap::Args)]
-struct RegressorArgs {
+pub(crate) struct RegressorArgs {
     /// Map whose images H learns from: each anchor with the images that follow it
     #[arg(long, value_name = "PATH", requires = "validation", conflicts_with = "experiment")]
     training: Option<PathBuf>,
@@ -132,11 +118,6 @@ impl FromStr for Limits {
     }
 }
 
-pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<Outcome> {
-    let What::Regressor(args) = &args.what;
-    args.run()
-}
-
 /// Pairs to learn from, pairs to validate on, and whose descriptors they are.
 struct Material {
     training: Pairs,
@@ -145,7 +126,7 @@ struct Material {
 }
 
 impl RegressorArgs {
-    fn run(&self) -> anyhow::Result<Outcome> {
+    pub(super) fn run(&self) -> anyhow::Result<Outcome> {
         let Material { training, validation, encoder } = match (&self.training, &self.validation) {
             (Some(training), Some(validation)) => self.of_maps(training, validation)?,
             _ => self.of_rooms()?,
@@ -292,12 +273,4 @@ impl Joined {
         let map = Map::new(vpr_core::Descriptors::new(rows)?, Poses::SixDof(self.poses))?;
         Ok(args.pairs(map, &self.sequences, every)?)
     }
-}
-
-/// Every validation on the screen, as in the log.
-#[expect(clippy::unnecessary_wraps, reason = "what training calls")]
-fn show(report: &Report, validation: f64) -> vpr_core::Result<()> {
-    let Report { step, loss, rate } = report;
-    cli::note(&format!("{step}: loss {loss:.5}, validation {validation:.5}, rate {rate:.2e}"));
-    Ok(())
 }
