@@ -161,7 +161,7 @@ fn rows_before_and_after_are_held_against_each_other() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let text = String::from_utf8(output.stdout).unwrap();
     for part in [
-        "+0.0 points on before: 0 queries gained, 0 lost, McNemar p 1.00e0",
+        "+0.0 points on before: 0 queries gained, 0 lost, McNemar mid-p 1.00e0",
         "models/none.safetensors is not at hand",
         "Wilson",
         "generated",

@@ -85,5 +85,7 @@ impl MapArgs {
 }
 
 fn say(notes: &[String]) {
-    notes.iter().for_each(|note| cli::note(&format!("note: {note}")));
+    for note in notes {
+        cli::note(&format!("note: {note}"));
+    }
 }

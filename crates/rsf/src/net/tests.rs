@@ -60,6 +60,14 @@ fn weights(network: &DefaultEncoder) -> Vec<(String, Vec<f32>)> {
     weights.iter().map(|(key, tensor)| (key.to_owned(), tensor.data.clone())).collect()
 }
 
+/// Names, in order, of the weights that differ.
+fn moved(before: &[(String, Vec<f32>)], after: &[(String, Vec<f32>)]) -> Vec<String> {
+    let pairs = before.iter().zip(after).filter(|(before, after)| before != after);
+    let mut names: Vec<String> = pairs.map(|(before, _)| before.0.clone()).collect();
+    names.sort();
+    names
+}
+
 /// The weights after the last step, whether they were best or not.
 fn last_weights(settings: &Finetuning, folder: &Path) -> Vec<(String, Vec<f32>)> {
     let (start, _) = default_network(None).unwrap();
@@ -117,13 +125,7 @@ fn frozen_parts_stay_and_others_move_also_after_a_kill() {
     assert!(tuned(&settings, &set, &work, usize::MAX).is_ok());
     let (start, _) = default_network(None).unwrap();
     let (before, after) = (weights(&start), last_weights(&settings, &work));
-    let mut moved: Vec<String> = before
-        .iter()
-        .zip(&after)
-        .filter_map(|(before, after)| (before != after).then(|| before.0.clone()))
-        .collect();
-    moved.sort();
-    assert_eq!(moved, ["head.bias", "head.weight", "trunk.reduce.weight"]);
+    assert_eq!(moved(&before, &after), ["head.bias", "head.weight", "trunk.reduce.weight"]);
 }
 
 #[test]
@@ -180,11 +182,8 @@ fn a_small_map_is_whitened_with_as_many_directions_as_it_has() {
     let lengths: Array2<f32> = rows.view().mapv(|it| it * it);
     assert!(lengths.rows().into_iter().all(|it| (it.sum() - 1.0).abs() < 1e-4));
     // The trunk is what it was, and the same numbers come out again.
-    let differs =
-        |(a, b): (&(String, Vec<f32>), &(String, Vec<f32>))| (a != b).then(|| a.0.clone());
-    let (before, after) = (weights(&start), weights(&fitted));
-    let moved: Vec<String> = before.iter().zip(&after).filter_map(differs).collect();
-    assert_eq!(moved, ["head.bias", "head.weight"]);
+    let after = weights(&fitted);
+    assert_eq!(moved(&weights(&start), &after), ["head.bias", "head.weight"]);
     let again = whiten(&Whitening::default(), start.clone(), &material).unwrap();
     assert_eq!(weights(&again), after);
     assert!(whiten(&Whitening { variants: 0, ..Whitening::default() }, start, &material).is_err());

@@ -56,7 +56,9 @@ pub(super) fn run(
         let columns = ["Queries", "Refs.", "Fréchet distance", "own neighbours"];
         let Some(dataset) = sources.images(&place.dataset)? else {
             let why = sources.why_absent(&place.dataset, "images")?;
-            columns.iter().for_each(|it| table.push(Cell::absent(&place.name, *it, &why)));
+            for column in columns {
+                table.push(Cell::absent(&place.name, column, &why));
+            }
             continue;
         };
         let rows = describe(&dataset.references, &dataset.name)?;

@@ -1,7 +1,6 @@
 //! What an experiment file of chapter 4 can ask for, one file per study.
 
 mod gaps;
-mod mcnemar;
 mod recalls;
 
 use std::path::PathBuf;
@@ -12,7 +11,6 @@ use vpr_study::Sources;
 use vpr_worlds::{Side, World, is_world, named_recipe};
 
 pub use gaps::{Gap, gap};
-pub use mcnemar::mcnemar;
 
 use crate::{ReferenceSet, Result};
 

@@ -2,13 +2,16 @@
 
 use std::{path::Path, sync::Arc};
 
-use vpr_core::metrics::bootstrap::{Z_95, wilson_interval};
+use vpr_core::metrics::{
+    Discordant, McNemar,
+    bootstrap::{Z_95, wilson_interval},
+};
 use vpr_data::Dataset;
 use vpr_nets::encode::by_name;
 use vpr_report::table::{Cell, Table};
 use vpr_study::{Direction, Network, Runner, Sources};
 
-use super::{Encoder, Place, mcnemar};
+use super::{Encoder, Place};
 use crate::Result;
 
 pub(super) fn run(
@@ -43,7 +46,7 @@ pub(super) fn run(
                 );
                 let cell = cell.within(interval.low, interval.high, "Wilson");
                 table.push(match &baseline {
-                    Some(before) => cell.noted(difference(&before[number], hits, encoders)),
+                    Some(before) => cell.noted(difference(&before[number], hits, encoders)?),
                     None => cell,
                 });
             }
@@ -60,17 +63,15 @@ fn column(place: &Place, rank: usize, n_ranks: usize) -> String {
 }
 
 /// What a reader must know of a cell beside that of the first encoder.
-fn difference(before: &[bool], after: &[bool], encoders: &[Encoder]) -> String {
-    let only = |this: &[bool], other: &[bool]| {
-        this.iter().zip(other).filter(|(this, other)| **this && !**other).count()
-    };
-    let (gained, lost) = (only(after, before), only(before, after));
-    let points = 100.0 * (gained as f64 - lost as f64) / before.len().max(1) as f64;
-    let p = mcnemar(gained, lost);
-    let first = encoders.first().map_or("", |it| it.name.as_str());
-    format!(
-        "{points:+.1} points on {first}: {gained} queries gained, {lost} lost, McNemar p {p:.2e}"
-    )
+fn difference(before: &[bool], after: &[bool], encoders: &[Encoder]) -> Result<String> {
+    let counts = Discordant::count(after, before)?;
+    let Discordant { n_queries, first: gained, second: lost } = counts;
+    let points = 100.0 * (gained as f64 - lost as f64) / n_queries as f64;
+    let p = counts.p_value(McNemar::MidP);
+    let name = encoders.first().map_or("", |it| it.name.as_str());
+    Ok(format!(
+        "{points:+.1} points on {name}: {gained} queries gained, {lost} lost, McNemar mid-p {p:.2e}"
+    ))
 }
 
 /// For each rank, for each query that has a correct reference, whether one is among the best; or why
