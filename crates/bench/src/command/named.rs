@@ -65,6 +65,26 @@ impl Named {
         Self { names, poses, coordinates: None, place, has_names: true, folder: None }
     }
 
+    /// These rows under the files of the images that they describe, in the same order.
+    ///
+    /// Rows that have names must have those of the images.
+    pub(super) fn of_images(self, images: &Self, method: &str) -> anyhow::Result<Self> {
+        if self.has_names {
+            let mut rows = self.names.iter().zip(&images.names).enumerate();
+            if let Some((row, (name, image))) =
+                rows.find(|(_, (name, image))| !image.ends_with(name))
+            {
+                anyhow::bail!(
+                    "`{method}`: row {row} is of {}, and image {row} is {}; the rows must be in the order of the \
+                     images",
+                    name.display(),
+                    image.display()
+                );
+            }
+        }
+        Ok(images.clone())
+    }
+
     /// Rows of a file of descriptors, with poses and names from another file if there is one, and
     /// else as far as its own says them.
     pub(super) fn rows(

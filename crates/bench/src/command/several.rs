@@ -81,6 +81,14 @@ impl Several<'_> {
             };
             let known = truth.as_ref().context("no truth")?;
             fits(method, &retrieved, known)?;
+            let retrieved = match (&images, &spec) {
+                (Some(images), Spec::Descriptors(..) | Spec::Scores(_)) => Retrieved {
+                    queries: retrieved.queries.of_images(&images.queries, method)?,
+                    references: retrieved.references.of_images(&images.references, method)?,
+                    ..retrieved
+                },
+                _ => retrieved,
+            };
             let is_first = found.is_empty();
             let retrieved = Retrieved {
                 similarities: retrieved.similarities.filter(|_| is_first),
