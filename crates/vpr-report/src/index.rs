@@ -49,7 +49,7 @@ pub fn html(folder: &Path) -> Result<String> {
             .into_iter()
             .find(|it| folder.join(format!("{}.{it}", entry.id)).is_file())
             .map(|it| {
-                format!("<a href=\"{page}\"><img src=\"{id}.{it}\" alt=\"\" width=\"240\"></a>")
+                format!("<a href=\"{page}\"><img src=\"{id}.{it}\" alt=\"{id} as a picture\" width=\"240\"></a>")
             });
         format!(
             "<tr><td><a href=\"{page}\">{id}</a></td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
@@ -64,7 +64,7 @@ pub fn html(folder: &Path) -> Result<String> {
     let head: String = head.map(|it| format!("<th scope=\"col\">{it}</th>")).concat();
     let body = format!(
         "<p>Every table and figure, where its numbers come from, and how many of those that the \
-         thesis prints read the same.</p>\n<div class=\"wide\" tabindex=\"0\"><table>\n\
+         thesis prints read the same.</p>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"all results\"><table>\n\
          <thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>\n"
     );
     Ok(html_document("Results", &body))

@@ -12,6 +12,8 @@
 //! assert!(text.contains("Corridor,HOG,0.477") && text.contains("no weights at hand"));
 //! ```
 
+#[cfg(test)]
+mod browser;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod experiment;

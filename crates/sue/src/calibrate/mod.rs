@@ -3,7 +3,6 @@
 //! Both ways need held-out queries that are exchangeable with those to come: the same map, encoder,
 //! estimator and kind of query. A change of season or camera voids the guarantee.
 
-mod binomial;
 mod false_acceptance;
 mod precision;
 

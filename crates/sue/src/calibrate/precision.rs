@@ -3,11 +3,9 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use vpr_core::metrics::LogFactorials;
 
-use super::{
-    binomial::{binomial_at_most, hypergeometric_at_most},
-    check_queries, check_share,
-};
+use super::{check_queries, check_share};
 use crate::{Result, Threshold};
 
 /// What the threshold is to achieve.
@@ -113,7 +111,8 @@ pub fn calibrate_precision(
         n_correct: 0,
     };
     let level = risk / N_STARTS as f64;
-    let first = smallest_testable(goal, level, n);
+    let table = LogFactorials::up_to(2 * n);
+    let first = smallest_testable(&table, goal, level, n);
     for start in starts(first, n) {
         // One past the last rank accepts every calibration query.
         for rank in (start..n).step_by(step(n)).chain([n]) {
@@ -123,7 +122,7 @@ pub fn calibrate_precision(
                 continue;
             }
             let n_correct = ranked[..n_accepted].iter().filter(|it| it.1).count();
-            if p_value(n_accepted - n_correct, n_accepted, goal) > level {
+            if p_value(&table, n_accepted - n_correct, n_accepted, goal) > level {
                 break;
             }
             if n_accepted > best.n_accepted {
@@ -136,8 +135,8 @@ pub fn calibrate_precision(
 }
 
 /// Fewest accepted matches, of `n`, that can pass a test, all of them being correct.
-fn smallest_testable(goal: PrecisionGoal, level: f64, n: usize) -> usize {
-    (1..=n).find(|&accepted| p_value(0, accepted, goal) <= level).unwrap_or(usize::MAX)
+fn smallest_testable(table: &LogFactorials, goal: PrecisionGoal, level: f64, n: usize) -> usize {
+    (1..=n).find(|&accepted| p_value(table, 0, accepted, goal) <= level).unwrap_or(usize::MAX)
 }
 
 /// Ranks at which sequences start, spread over those that can pass.
@@ -154,10 +153,10 @@ fn step(n: usize) -> usize {
 }
 
 /// A p-value for "the precision is lower than wanted", given `wrong` of `accepted`.
-fn p_value(wrong: usize, accepted: usize, goal: PrecisionGoal) -> f64 {
+fn p_value(table: &LogFactorials, wrong: usize, accepted: usize, goal: PrecisionGoal) -> f64 {
     let allowed = 1.0 - goal.precision;
     match goal.scope {
-        Scope::Population => binomial_at_most(wrong, accepted, allowed),
+        Scope::Population => table.tail(wrong, accepted, allowed, 1.0),
         Scope::NextBatch => {
             // The promise breaks if more than this many of the next matches are wrong.
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a count")]
@@ -167,7 +166,7 @@ fn p_value(wrong: usize, accepted: usize, goal: PrecisionGoal) -> f64 {
                 return 0.0;
             }
             // Largest over all totals that would break it: the smallest such total.
-            hypergeometric_at_most(wrong, 2 * accepted, wrong + broken, accepted)
+            table.hypergeometric_tail(wrong, 2 * accepted, wrong + broken, accepted)
         }
     }
 }

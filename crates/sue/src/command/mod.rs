@@ -8,6 +8,7 @@ mod normalization;
 mod report;
 pub(crate) mod run;
 mod scores;
+mod side;
 mod threshold;
 pub(crate) mod train;
 mod truth;

@@ -100,11 +100,17 @@ fn column(opened: &Labelled, query: usize, n: usize, remark: String) -> Vec<Tile
 /// A number in few letters.
 fn short(value: f64) -> String {
     match value.abs() {
-        size if size >= 100.0 => format!("{value:.0}"),
-        size if size >= 1.0 || size == 0.0 => format!("{value:.2}"),
+        // Counts, and no sign before zero.
+        size if size >= 100.0 || size.fract() == 0.0 => format!("{:.0}", value + 0.0),
+        size if size >= 1.0 => format!("{value:.2}"),
         size if size >= 1e-3 => format!("{value:.3}"),
         _ => format!("{value:.1e}"),
     }
+}
+
+/// A share below one, in three letters.
+fn share(value: f64) -> String {
+    format!("{value:.2}").trim_start_matches('0').to_owned()
 }
 
 /// One tile in numbers: which query, how uncertain, whether its match is correct.
@@ -172,7 +178,7 @@ fn disagreements(
             let rank = ranks(uncertainty)[query];
             push(table, opened, label, &format!("share of queries below, {name}"), (query, rank));
         }
-        let remark = format!("SUE {:.2} L2 {:.2}", sue[query], distance[query]);
+        let remark = format!("SUE {} L2 {}", share(sue[query]), share(distance[query]));
         sheet.add_row(label, column(opened, query, NEIGHBORS, remark));
     }
 }
@@ -195,7 +201,7 @@ fn complements(
         let row = format!("pair {}", i + 1);
         push(table, opened, &row, "share of queries below, SUE", (query, sue[query]));
         push(table, opened, &row, "share of queries below, verification", (query, verified[query]));
-        let remark = format!("SUE {:.2} GV {:.2}", sue[query], verified[query]);
+        let remark = format!("SUE {} GV {}", share(sue[query]), share(verified[query]));
         columns.push(column(opened, query, 1, remark));
     }
     sheet.add_columns("correct, doubted by verification (GV) and not by SUE", columns);
@@ -226,5 +232,17 @@ fn ranked(
         let remark = |query: usize| format!("u {}", short(uncertainty[query]));
         let columns = chosen.iter().map(|&query| column(opened, query, 1, remark(query))).collect();
         sheet.add_columns(format!("{name}: from least to most uncertain"), columns);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn remarks_fit_below_a_tile() {
+        let numbers = [-0.0, -26.0, 0.918, 1.03, 1526.4, 3.0e-70, 0.068].map(short);
+        assert_eq!(numbers, ["0", "-26", "0.918", "1.03", "1526", "3.0e-70", "0.068"]);
+        assert_eq!([0.21, 0.0, 0.999].map(share), [".21", ".00", "1.00"]);
     }
 }

@@ -2,7 +2,7 @@
 
 use vpr_core::{Provenance, metrics::spearman};
 use vpr_report::{
-    figure::{Curve, Figure, Panel},
+    figure::{Curve, Figure, Panel, Scale},
     table::{Cell, Table},
 };
 use vpr_study::Dial;
@@ -52,6 +52,11 @@ pub(super) fn run(
             title: learned.name().to_owned(),
             x_label: dial.name.clone(),
             y_label: "mean variance".into(),
+            x_scale: if dial.values.iter().all(|it| *it > 0.0) {
+                Scale::Log
+            } else {
+                Scale::Linear
+            },
             curves: vec![Curve::new(learned.name(), points)],
             ..Panel::default()
         });

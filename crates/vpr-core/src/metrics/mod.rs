@@ -48,6 +48,7 @@ mod spacing;
 
 pub use area::auc;
 pub use average::mean_average_precision;
+pub use binomial::LogFactorials;
 pub use correlation::spearman;
 pub use curve::{Positives, PrecisionRecall, auc_pr, average_precision, precision_recall_curve};
 pub use difference::{Difference, paired_test};

@@ -46,8 +46,15 @@ impl Axis {
 
     /// Where a value lies along the axis, 0 to 1; `None` if it cannot be shown.
     pub(super) fn share(&self, value: f64) -> Option<f64> {
+        self.beyond(value).filter(|share| (0.0..=1.0).contains(share))
+    }
+
+    /// The same, also before and behind the ends of the axis; at them where only rounding says
+    /// otherwise.
+    pub(super) fn beyond(&self, value: f64) -> Option<f64> {
         let share = (transform(self.scale, value)? - self.low) / (self.high - self.low);
-        (-1e-9..=1.0 + 1e-9).contains(&share).then_some(share)
+        let end = if share < 0.5 { 0.0 } else { 1.0 };
+        Some(if (share - end).abs() <= 1e-9 { end } else { share })
     }
 
     fn steps(&self, n: f64) -> Vec<(f64, String)> {
@@ -92,11 +99,21 @@ fn transform(scale: Scale, value: f64) -> Option<f64> {
 /// A number beside an axis, with as many decimals as its step needs.
 fn number(value: f64, step: f64) -> String {
     let value = if value.abs() < step * 1e-6 { 0.0 } else { value };
-    if value.abs() >= 1e5 || step < 1e-4 {
-        return format!("{value:.1e}").replace(".0e", "e");
+    if value != 0.0 && (value.abs() >= 1e5 || step < 1e-4) {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 15")]
+        let digits =
+            (value.abs().log10().floor() - (step.log10() + 1e-9).floor()).clamp(0.0, 15.0) as usize;
+        let text = format!("{value:.digits$e}");
+        return match text.split_once('e') {
+            Some((digits, power)) if digits.contains('.') => {
+                format!("{}e{power}", digits.trim_end_matches('0').trim_end_matches('.'))
+            }
+            _ => text,
+        };
     }
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 4")]
     let decimals = (-(step.log10() + 1e-9).floor()).clamp(0.0, 4.0) as usize;
+    let decimals = if value == 0.0 && step < 1e-4 { 0 } else { decimals };
     format!("{value:.decimals$}")
 }
 
@@ -115,6 +132,10 @@ mod tests {
         assert!((axis.share(0.62).unwrap()).abs() < 1e-12 && axis.share(0.5).is_none());
         let axis = Axis::over([-1.0, f64::NAN, 1.0].into_iter(), Scale::Linear, 4.0, &[]);
         assert_eq!(texts(&axis), ["-1.0", "-0.5", "0.0", "0.5", "1.0"]);
+        let axis = Axis::over([1.16e-6, 1.29e-6].into_iter(), Scale::Linear, 3.0, &[]);
+        assert_eq!(texts(&axis), ["1.2e-6", "1.25e-6"]);
+        let axis = Axis::over([0.0, 250_000.0].into_iter(), Scale::Linear, 3.0, &[]);
+        assert_eq!(texts(&axis), ["0", "1e5", "2e5"]);
         let axis = Axis::over([0.0, 250.0].into_iter(), Scale::Linear, 3.0, &[]);
         assert_eq!(texts(&axis), ["0", "100", "200"]);
     }

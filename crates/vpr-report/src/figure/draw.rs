@@ -187,7 +187,7 @@ fn draw_frame(out: &mut String, plan: &Plan<'_>, frame: &Frame<'_>, tolerance: (
             Shape::Line => {
                 let path = line(frame, &curve.points, tolerance.0);
                 let _ = writeln!(out, "<path class=\"l c{colour}\" d=\"{path}\"/>");
-                let marks = marks(&places(frame, &curve.points), nth);
+                let marks = marks(frame, curve, nth);
                 let path = marks.into_iter().map(|it| outline(style.mark, it, 3.6));
                 out.push_str(&marked(style, &path.collect::<String>()));
             }
@@ -239,12 +239,18 @@ fn places(frame: &Frame<'_>, points: &[(f64, f64)]) -> Vec<Place> {
     places.map(|(x, y)| (tenths(x), tenths(y))).collect()
 }
 
-/// A line through all points; one that cannot be shown breaks it.
+/// What can be seen of a line through all points, in tenths of a pixel.
+fn pieces(frame: &Frame<'_>, points: &[(f64, f64)]) -> Vec<Vec<Place>> {
+    let whole =
+        |piece: Vec<(f64, f64)>| piece.iter().map(|it| (tenths(it.0), tenths(it.1))).collect();
+    frame.pieces(points).into_iter().map(whole).collect()
+}
+
+/// A line through all points, cut where it leaves the axes.
 fn line(frame: &Frame<'_>, points: &[(f64, f64)], tolerance: i64) -> String {
-    let is_shown = |point: &(f64, f64)| frame.place(*point).is_some();
     let mut path = String::new();
-    for piece in points.split(|point| !is_shown(point)) {
-        for (index, place) in simplify(&places(frame, piece), tolerance).into_iter().enumerate() {
+    for piece in pieces(frame, points) {
+        for (index, place) in simplify(&piece, tolerance).into_iter().enumerate() {
             let command = if index == 0 { 'M' } else { 'L' };
             let _ = write!(path, "{command}{} {}", number(place.0), number(place.1));
         }
@@ -252,23 +258,33 @@ fn line(frame: &Frame<'_>, points: &[(f64, f64)], tolerance: i64) -> String {
     path
 }
 
-/// Where a line has its marks: at each of few points; otherwise at equal steps along its way,
-/// most of all along the horizontal, shifted by its place among the curves, so that lines that run together show all of their marks.
-fn marks(places: &[Place], nth: usize) -> Vec<Place> {
-    if places.len() <= FEW {
-        return places.to_vec();
+/// Where a line has its marks: at each of few points, otherwise along its way. A curve without a
+/// name, such as a histogram, is told from no other.
+fn marks(frame: &Frame<'_>, curve: &Curve, nth: usize) -> Vec<Place> {
+    let points = places(frame, &curve.points);
+    match points.len() {
+        _ if curve.name.is_empty() => Vec::new(),
+        0..=FEW => points,
+        _ => along(&pieces(frame, &curve.points), nth),
     }
+}
+
+/// Places at equal steps along a line, most of all along the
+/// horizontal, shifted by its place among the curves, so that lines that run together show all of
+/// their marks.
+fn along(pieces: &[Vec<Place>], nth: usize) -> Vec<Place> {
+    let steps = || pieces.iter().flat_map(|piece| piece.windows(2));
     let step = |pair: &[Place]| {
         let (dx, dy) = ((pair[1].0 - pair[0].0) as f64, (pair[1].1 - pair[0].1) as f64);
         // Mostly along: what goes up and down on the spot needs no marks.
         dx.abs() + 0.1 * dy.abs()
     };
-    let length: f64 = places.windows(2).map(step).sum();
+    let length: f64 = steps().map(step).sum();
     let shift = (nth % 8) as f64 / 8.0;
     let mut wanted =
         (0..MARKS).map(|it| (it as f64 + 0.1 + 0.8 * shift) / MARKS as f64 * length).peekable();
     let (mut way, mut marks) = (0.0, Vec::new());
-    for pair in places.windows(2) {
+    for pair in steps() {
         let reach = way + step(pair);
         while let Some(at) = wanted.next_if(|&at| at <= reach) {
             let share = if reach > way { (at - way) / (reach - way) } else { 0.0 };

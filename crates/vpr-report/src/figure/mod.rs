@@ -12,6 +12,7 @@ mod plan;
 mod text;
 mod theme;
 mod thin;
+mod visible;
 
 #[cfg(test)]
 mod tests;

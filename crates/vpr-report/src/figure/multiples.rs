@@ -46,8 +46,11 @@ fn split(panel: &Panel) -> Vec<Multiple<'_>> {
                 (0..panel.curves.len()).partition(|&index| is_shown(&panel.curves[index]));
             let of_origin = origin.filter(|_| origins.len() > 1);
             let of_origin = of_origin.map_or(String::new(), |origin| format!(", {origin}"));
-            let of_parts =
-                if parts > 1 { format!(" ({} of {parts})", part + 1) } else { String::new() };
+            let of_parts = if parts > 1 {
+                format!(" ({}\u{a0}of\u{a0}{parts})", part + 1)
+            } else {
+                String::new()
+            };
             let title = format!("{}{of_origin}{of_parts}", panel.title);
             // What is grey must not hide what is shown.
             let grey = grey.into_iter().filter(|&it| panel.curves[it].shape == Shape::Line);
@@ -83,7 +86,11 @@ mod tests {
         let titles: Vec<&str> = parts.iter().map(|it| it.title.as_str()).collect();
         assert_eq!(
             titles,
-            ["Corridor, published (1 of 2)", "Corridor, published (2 of 2)", "Corridor, measured"]
+            [
+                "Corridor, published (1\u{a0}of\u{a0}2)",
+                "Corridor, published (2\u{a0}of\u{a0}2)",
+                "Corridor, measured"
+            ]
         );
         assert_eq!(parts[1].shown, [5, 6, 7, 8, 9]);
         assert_eq!((parts[2].shown.len(), parts[2].grey.len()), (5, 10));

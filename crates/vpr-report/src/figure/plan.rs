@@ -6,8 +6,9 @@ use super::{
     apart::apart,
     axis::Axis,
     multiples::Multiple,
-    text::{width, wrap},
+    text::{BOLD, width, wrap},
     theme::{Style, styles},
+    visible::visible,
 };
 
 /// Font sizes in pixels, and from one line to the next.
@@ -85,12 +86,19 @@ pub(super) struct Plan<'a> {
 impl Frame<'_> {
     /// A point in pixels; `None` if it cannot be shown.
     pub(super) fn place(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
-        let (x, y) = (self.x.share(x)?, self.y.share(y)?);
+        Some(self.pixels((self.x.share(x)?, self.y.share(y)?)))
+    }
+
+    fn pixels(&self, (x, y): (f64, f64)) -> (f64, f64) {
         let Rect { x: left, y: top, width, height } = self.plot;
-        Some((
-            left + INSET + x * (width - 2.0 * INSET),
-            top + INSET + (1.0 - y) * (height - 2.0 * INSET),
-        ))
+        (left + INSET + x * (width - 2.0 * INSET), top + INSET + (1.0 - y) * (height - 2.0 * INSET))
+    }
+
+    /// What can be seen of the straight lines between points, in pixels: unbroken pieces.
+    pub(super) fn pieces(&self, points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
+        let shares = points.iter().map(|&(x, y)| Some((self.x.beyond(x)?, self.y.beyond(y)?)));
+        let pixels = |piece: Vec<(f64, f64)>| piece.into_iter().map(|it| self.pixels(it)).collect();
+        visible(shares).into_iter().map(pixels).collect()
     }
 }
 
@@ -155,10 +163,7 @@ pub(super) fn plan<'a>(multiples: &'a [Multiple<'a>], caption: &str) -> Plan<'a>
     let shares_y = all_same(multiples.iter().map(|it| it.panel.y_label.as_str()));
     for (row, (multiples, axes)) in multiples.chunks(columns).zip(axes.chunks(columns)).enumerate()
     {
-        let titles: Vec<Vec<String>> = multiples
-            .iter()
-            .map(|it| wrap(&it.title, TITLE, plot_width + right - 10.0, 4))
-            .collect();
+        let titles = titles(multiples, plot_width + right - 10.0, n_columns);
         let title_height = LINE * titles.iter().map(Vec::len).max().unwrap_or(0) as f64;
         let y = top + title_height + 6.0;
         let mut bottom = 0.0_f64;
@@ -185,6 +190,14 @@ pub(super) fn plan<'a>(multiples: &'a [Multiple<'a>], caption: &str) -> Plan<'a>
     }
     plan.height = top - 14.0 + MARGIN;
     plan
+}
+
+/// Titles of a row of panels, in lines. Beside a panel there is room up to the next one's plot, beside
+/// the last one there is none.
+fn titles(multiples: &[Multiple<'_>], width: f64, n_columns: usize) -> Vec<Vec<String>> {
+    let size = |column: usize| if column + 1 == n_columns { TITLE * BOLD } else { TITLE };
+    let lines = |(column, it): (usize, &Multiple<'_>)| wrap(&it.title, size(column), width, 4);
+    multiples.iter().enumerate().map(lines).collect()
 }
 
 fn all_same<'a>(mut items: impl Iterator<Item = &'a str>) -> bool {
@@ -225,7 +238,7 @@ fn label_width(multiples: &[Multiple<'_>]) -> f64 {
 fn head(plan: &mut Plan<'_>, multiples: &[Multiple<'_>], caption: &str, is_direct: bool) -> f64 {
     let limit = plan.width - 2.0 * MARGIN;
     let mut y = MARGIN;
-    for line in wrap(caption, TITLE, limit, 3) {
+    for line in wrap(caption, TITLE * BOLD, limit, 3) {
         plan.line(MARGIN, y + 11.0, &line, Anchor::Start, true);
         y += LINE + 2.0;
     }

@@ -1,11 +1,15 @@
 //! Every figure of the book from synthetic curves of the same shapes: names stay off the curves and
 //! inside of the picture, and no two curves of a panel look alike.
 
+mod reading;
+mod shown;
+
 use std::collections::BTreeSet;
 
 use vpr_core::Provenance::{Generated, Measured, Published};
 
-use super::{Curve, Figure, Panel, Scale, Shape, multiples::multiples, plan::plan, text::width};
+use super::{Curve, Figure, Panel, Scale, Shape, multiples::multiples, plan::plan};
+use reading::{committed, faults, texts};
 
 const TECHNIQUES: [&str; 10] = [
     "NetVLAD",
@@ -163,7 +167,9 @@ fn sweep() -> Figure {
             let names = TECHNIQUES.iter().chain(&RUNNING).enumerate();
             let curves = names.map(|(index, name)| {
                 let mut random = noise(at * 30 + index);
-                Curve::new(*name, values.iter().map(|&x| (x, 0.6 + 0.3 * random())).collect())
+                let points = values.iter().map(|&x| (x, 0.6 + 0.3 * random())).collect();
+                let is_stored = index < TECHNIQUES.len();
+                Curve::new(*name, points).of(if is_stored { Published } else { Measured })
             });
             panels.push(panel(&format!("{dataset}, λ = 350"), ("K", "AUC-PR"), curves.collect()));
         }
@@ -226,6 +232,19 @@ fn intervals() -> Figure {
     Figure { panels: vec![one("darkness", &RUNNING), one("BTL", &["BTL"]), one("few", &["SUE"])] }
 }
 
+fn times() -> Figure {
+    let sizes = [1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6];
+    let curve =
+        |name: &str, times: [f64; 7]| Curve::new(name, sizes.into_iter().zip(times).collect());
+    let curves = vec![
+        curve("1 query", [0.0247, 0.0480, 0.1455, 0.5096, 2.5964, 8.1427, 28.0866]),
+        curve("100 queries, per query", [0.0097, 0.0181, 0.0348, 0.0778, 0.2151, 0.6056, 2.7487]),
+        curve("one pass over memory", [0.0115, 0.0220, 0.1025, 0.3335, 2.2068, 7.1252, 25.5344]),
+    ];
+    let panel = panel("References of 128 values", ("references", "milliseconds"), curves);
+    Figure { panels: vec![Panel { x_scale: Scale::Log, y_scale: Scale::Log, ..panel }] }
+}
+
 /// Every figure of the book, by the file it is like.
 fn figures() -> Vec<(&'static str, Figure)> {
     vec![
@@ -257,75 +276,10 @@ fn figures() -> Vec<(&'static str, Figure)> {
         ("figure-5.10", estimators(33, &ESTIMATORS[..8])),
         ("figure-5.11", clouds()),
         ("worlds", intervals()),
+        ("search-scaling", times()),
         ("empty", Figure { panels: vec![Panel::default()] }),
         ("none", Figure::default()),
     ]
-}
-
-#[derive(Clone, Debug)]
-struct Bounds {
-    what: String,
-    x: [f64; 2],
-    y: [f64; 2],
-}
-
-impl Bounds {
-    fn overlaps(&self, other: &Self) -> bool {
-        let meets = |a: [f64; 2], b: [f64; 2]| a[0] < b[1] - 0.5 && b[0] < a[1] - 0.5;
-        meets(self.x, other.x) && meets(self.y, other.y)
-    }
-}
-
-fn attribute<'a>(element: &'a str, name: &str) -> Option<&'a str> {
-    let start = element.find(&format!(" {name}=\""))? + name.len() + 3;
-    element[start..].split('"').next()
-}
-
-/// The box of every text of a document.
-fn texts(svg: &str) -> Vec<Bounds> {
-    let elements = svg.lines().filter(|line| line.starts_with("<text"));
-    let of = |line: &str| {
-        let (head, rest) = line.split_once('>').unwrap();
-        let text = rest.trim_end_matches("</text>").replace("&#39;", "'");
-        let get = |name: &str| attribute(head, name).unwrap().parse::<f64>().unwrap();
-        let class = attribute(head, "class").unwrap_or_default();
-        let size = if class.contains('t') { 12.5 } else { 11.0 };
-        let length = width(&text, size);
-        let (x, y) = (get("x"), get("y"));
-        let back = if class.contains('s') { 0.5 } else { f64::from(class.contains('e')) };
-        let start = -back * length;
-        if head.contains("rotate(-90") {
-            return Bounds {
-                what: text,
-                x: [x - size * 0.8, x + 2.0],
-                y: [y - length - start, y - start],
-            };
-        }
-        Bounds { what: text, x: [x + start, x + start + length], y: [y - size * 0.75, y + 2.0] }
-    };
-    elements.map(of).collect()
-}
-
-/// The boxes of everything that is drawn with one of these classes.
-fn drawn(svg: &str, classes: &[char]) -> Vec<Bounds> {
-    let elements = svg.lines().filter(|line| {
-        line.starts_with("<path")
-            && attribute(line, "class").is_some_and(|it| it.starts_with(classes))
-    });
-    let of = |line: &str| {
-        let data = attribute(line, "d").unwrap();
-        let mut bounds =
-            Bounds { what: line[..line.len().min(40)].into(), x: [1e9, -1e9], y: [1e9, -1e9] };
-        for piece in data.split(['M', 'L']).filter(|it| !it.is_empty()) {
-            let end = piece.find(|it: char| it.is_ascii_alphabetic()).unwrap_or(piece.len());
-            let (x, y) = piece[..end].split_once(' ').unwrap();
-            let (x, y): (f64, f64) = (x.parse().unwrap(), y.parse().unwrap());
-            bounds.x = [bounds.x[0].min(x), bounds.x[1].max(x)];
-            bounds.y = [bounds.y[0].min(y), bounds.y[1].max(y)];
-        }
-        bounds
-    };
-    elements.filter(|it| !attribute(it, "d").unwrap().is_empty()).map(of).collect()
 }
 
 #[test]
@@ -335,21 +289,34 @@ fn names_stay_off_the_curves_and_inside_of_the_picture() {
         if let Some(folder) = std::env::var_os("VPR_FIGURES") {
             std::fs::write(std::path::Path::new(&folder).join(format!("{id}.svg")), &svg).unwrap();
         }
-        assert!(svg.len() <= 300_000, "{id}: {} bytes", svg.len());
-        let root = svg.lines().next().unwrap();
-        let side = |name: &str| attribute(root, name).unwrap().parse::<f64>().unwrap();
-        let (texts, curves) = (texts(&svg), drawn(&svg, &['l', 'p', 'b', 'o', 'h', 'm', 'x', 'w']));
-        assert!(id == "none" || !texts.is_empty(), "{id}");
-        for (index, text) in texts.iter().enumerate() {
-            let is_inside = text.x[0] >= 0.0 && text.y[0] >= 0.0;
-            let is_inside = is_inside && text.x[1] <= side("width") && text.y[1] <= side("height");
-            assert!(is_inside, "{id}: {} is outside of the picture", text.what);
-            let over = curves.iter().find(|curve| curve.overlaps(text));
-            assert!(over.is_none(), "{id}: {text:?} lies over {over:?}");
-            let other = texts[..index].iter().find(|it| it.overlaps(text));
-            assert!(other.is_none(), "{id}: {text:?} lies over {other:?}");
-        }
+        assert_eq!(faults(&svg), [""; 0], "{id}");
+        assert!(id == "none" || !texts(&svg).is_empty(), "{id}");
     }
+}
+
+#[test]
+fn committed_figures_are_read_without_a_fault() {
+    let committed = committed();
+    assert!(committed.len() >= 20, "{} figures", committed.len());
+    for (name, svg) in committed {
+        assert_eq!(faults(&svg), [""; 0], "{name}");
+    }
+}
+
+#[test]
+fn faults_are_found() {
+    let figure = figures().remove(0).1;
+    let svg = figure.svg("caption");
+    let found = |from: &str, to: &str| {
+        assert!(svg.contains(from), "{from}");
+        faults(&svg.replacen(from, to, 1)).join("; ")
+    };
+    let longer = |text: &str, n: usize| {
+        found(&format!(">{text}</text>"), &format!(">{}</text>", format!("{text} ").repeat(n)))
+    };
+    assert!(longer("caption", 99).contains("outside"));
+    assert!(longer("AlexNet", 9).contains("over"));
+    assert!(found("class=\"l c5\"", "class=\"l c0\"").contains("colour 0 twice"));
 }
 
 #[test]
@@ -363,8 +330,8 @@ fn no_two_curves_of_a_panel_look_alike_and_eight_are_enough() {
                 multiple.shown.iter().map(|&it| multiple.panel.curves[it].name.as_str()).collect();
             assert!(names.len() <= 8, "{id}");
             let style = |name: &str| plan.styles.iter().find(|it| it.0 == name).unwrap().1;
-            let styles: BTreeSet<_> = names.iter().map(|name| style(name)).collect();
-            assert_eq!(styles.len(), names.len(), "{id}: {names:?}");
+            let colours: BTreeSet<_> = names.iter().map(|name| style(name).colour).collect();
+            assert_eq!(colours.len(), names.len(), "{id}: {names:?}");
         }
         for &(name, style) in &plan.styles {
             if super::style_of(name).is_some() {

@@ -5,12 +5,15 @@ pub(super) fn width(text: &str, size: f64) -> f64 {
     size * text.chars().map(em).sum::<f64>()
 }
 
+/// How much wider a bold text is.
+pub(super) const BOLD: f64 = 1.13;
+
 /// Width of a character in units of the font size: `DejaVu Sans`, the widest of the usual fonts.
 fn em(it: char) -> f64 {
     match it {
         'i' | 'j' | 'l' | '\'' | '|' => 0.29,
-        ' ' | '.' | ',' | ':' | ';' | '!' | 'I' | '/' | '(' | ')' | '[' | ']' | '-' | 't' | 'f'
-        | 'r' => 0.4,
+        ' ' | '\u{a0}' | '.' | ',' | ':' | ';' | '!' | 'I' | '/' | '(' | ')' | '[' | ']' | '-'
+        | 't' | 'f' | 'r' => 0.4,
         'm' | 'w' | 'M' | 'W' | '%' | '@' | '…' | '—' => 0.99,
         'A'..='Z' => 0.72,
         '+' | '=' | '<' | '>' | '±' | '×' => 0.84,

@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use vpr_core::metrics::{Discordant, McNemar};
+
 use super::{Judged, Report, escape};
 
 /// Pairs listed.
@@ -33,7 +35,8 @@ pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged])
             first.iter().zip(second).filter(|it| (*it.0, *it.1) == wanted).count()
         };
         let (wins, losses) = (count((true, false)), count((false, true)));
-        let p = sign_test(wins, losses);
+        let p = Discordant { n_queries: first.len(), first: wins, second: losses }
+            .p_value(McNemar::Exact);
         let p = if p < 0.001 { "&lt; 0.001".to_owned() } else { format!("{p:.3}") };
         writeln!(
             out,
@@ -50,35 +53,4 @@ pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged])
          least as uneven if both were equally good; below 0.05 the difference is more than luck of the \
          queries.</p>\n</section>"
     )
-}
-
-/// Two-sided exact sign test: the chance that of `wins + losses` fair coins so few or fewer fall on
-/// the rarer side, twice.
-fn sign_test(wins: usize, losses: usize) -> f64 {
-    let n = wins + losses;
-    let log_half = -(n as f64) * std::f64::consts::LN_2;
-    // The logarithm of each binomial coefficient from the one before.
-    let (mut log_choose, mut tail) = (0.0, 0.0);
-    for k in 0..=wins.min(losses) {
-        if k > 0 {
-            log_choose += ((n - k + 1) as f64 / k as f64).ln();
-        }
-        tail += (log_choose + log_half).exp();
-    }
-    (2.0 * tail).min(1.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_sign_test_counts_coins() {
-        // Of three coins: all on one side, 2 · 1/8.
-        assert!((sign_test(3, 0) - 0.25).abs() < 1e-12);
-        // 2 · (1 + 5) / 32
-        assert!((sign_test(1, 4) - 0.375).abs() < 1e-12);
-        assert!((sign_test(0, 0) - 1.0).abs() < 1e-12 && (sign_test(7, 7) - 1.0).abs() < 1e-12);
-        assert!(sign_test(9000, 100) < 1e-100);
-    }
 }

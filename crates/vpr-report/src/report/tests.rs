@@ -1,6 +1,8 @@
 //! Reports of synthetic runs: nothing hostile gets through, nothing needed is missing, and large
 //! ones stay within their budget.
 
+mod shown;
+
 use std::cell::RefCell;
 
 use vpr_core::{GroundTruth, Poses};
@@ -206,68 +208,4 @@ fn a_large_report_keeps_its_budget_and_the_most_telling_pictures() {
     let first = thumbnails::by_interest(&judged)[0];
     assert!(judged.accepts(first) && judged.is_correct(first) == Some(false));
     assert!(html.contains(&format!(".q0-{first}{{background-image")));
-}
-
-/// The report as a browser shows it once its script has run; `None` without a browser.
-fn shown(path: &std::path::Path, fragment: &str, width: u32) -> Option<String> {
-    let profile = tempfile::tempdir().unwrap();
-    let output = std::process::Command::new("chromium")
-        .args([
-            "--headless",
-            "--no-sandbox",
-            "--disable-gpu",
-            "--dump-dom",
-            "--enable-logging=stderr",
-        ])
-        .arg(format!("--window-size={width},900"))
-        .arg(format!("--user-data-dir={}", profile.path().display()))
-        .arg(format!("file://{}{fragment}", path.display()))
-        .output();
-    let output = match output {
-        Ok(output) => output,
-        Err(err) if err.kind() == io::ErrorKind::NotFound => return None,
-        Err(err) => panic!("{err}"),
-    };
-    let log = String::from_utf8_lossy(&output.stderr);
-    let complaint = log.lines().find(|line| line.contains(":CONSOLE"));
-    assert_eq!(complaint, None, "the script or the policy complained");
-    Some(String::from_utf8_lossy(&output.stdout).into_owned())
-}
-
-#[test]
-#[expect(clippy::print_stderr, reason = "says that it was skipped")]
-fn filters_change_map_curves_and_gallery_together() {
-    let road = Road::new(200);
-    let report = report(road.dataset(), vec![road.run("HOG", 5, 3), road.run("CoHOG", 5, 4)]);
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("report.html");
-    std::fs::write(&path, text(&report)).unwrap();
-    let judged = Judged::new(&report, &report.runs[0]);
-    let of = |right: bool, accepted: bool| {
-        let is = |&query: &usize| {
-            judged.is_correct(query) == Some(right) && judged.accepts(query) == accepted
-        };
-        (0..200).filter(is).count()
-    };
-    for (fragment, width, n, n_right) in [
-        ("", 1600, 200, of(true, true) + of(true, false)),
-        ("#wr", 360, of(false, false), 0),
-        ("#ra", 1600, of(true, true), of(true, true)),
-    ] {
-        let Some(dom) = shown(&path, fragment, width) else {
-            eprintln!("skipped: chromium is not installed");
-            return;
-        };
-        let count = format!("{n} of 200 queries, {n_right} of them right");
-        assert!(dom.contains(&count), "{fragment}: not `{count}`");
-        assert!(dom.contains(&format!("HOG, {n} queries</span>")), "the map of {fragment}");
-        let cards = dom.matches("<article class=\"card\">").count();
-        assert_eq!(cards, n.min(24), "cards of {fragment}");
-        let last = dom.split("id=\"risk-coverage\"").nth(1).unwrap();
-        let chosen = last.split("<path class=\"chosen\" d=\"").nth(1).unwrap();
-        let risk = 1.0 - n_right as f64 / n as f64;
-        let end = format!("L328.0 {:.1}\"", 10.0 + (1.0 - risk) * 196.0);
-        let curve = chosen.split_inclusive('"').next().unwrap();
-        assert!(curve.ends_with(&end), "{fragment}: {curve} does not end in {end}");
-    }
 }

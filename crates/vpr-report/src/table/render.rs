@@ -74,7 +74,10 @@ fn html(block: &Block) -> String {
             .iter()
             .fold(String::new(), |text, it| text + &format!("<{tag}>{}</{tag}>", escape(it)))
     };
-    let mut text = String::from("<div class=\"wide\" tabindex=\"0\"><table>\n");
+    let label = escape(block.heading.as_deref().unwrap_or("numbers"));
+    let mut text = format!(
+        "<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{label}\"><table>\n"
+    );
     if let Some(row) = &block.heading {
         let _ = writeln!(text, "<caption>{}</caption>", escape(row));
     }
