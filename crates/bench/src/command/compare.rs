@@ -77,20 +77,7 @@ pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
         k: args.recall_values.iter().copied().max().unwrap_or(1),
     };
     let (found, truth, provenance) = several.retrieve()?;
-    let protocol = Protocol {
-        metrics: metrics(&args.recall_values),
-        test: match args.test {
-            Test::MidP => McNemar::MidP,
-            Test::Exact => McNemar::Exact,
-        },
-        level: args.level,
-        power: args.power,
-        resampling: Resampling {
-            n_resamples: args.resamples,
-            seed: args.seed,
-            ..Resampling::default()
-        },
-    };
+    let protocol = args.protocol();
     warn_of_few_resamples(args);
     let borrowed: Vec<Found<'_>> = found
         .iter()
@@ -129,6 +116,25 @@ pub(crate) fn run(args: &CompareArgs) -> anyhow::Result<Outcome> {
         found.iter().map(|(name, it)| (name.as_str(), it)).collect();
     report::write(&args.input, &args.report, &runs, Some(&truth))?;
     Ok(Outcome::Success)
+}
+
+impl CompareArgs {
+    fn protocol(&self) -> Protocol {
+        Protocol {
+            metrics: metrics(&self.recall_values),
+            test: match self.test {
+                Test::MidP => McNemar::MidP,
+                Test::Exact => McNemar::Exact,
+            },
+            level: self.level,
+            power: self.power,
+            resampling: Resampling {
+                n_resamples: self.resamples,
+                seed: self.seed,
+                ..Resampling::default()
+            },
+        }
+    }
 }
 
 fn metrics(recall_values: &[usize]) -> Vec<Metric> {

@@ -7,6 +7,7 @@ mod descriptor_size;
 mod invariance;
 mod lights;
 mod metrics;
+mod overlap;
 mod platform_speed;
 mod pr_curves;
 mod range;
@@ -16,6 +17,7 @@ mod spacing;
 mod swap;
 mod tolerances;
 mod verification;
+mod winners;
 mod worlds;
 
 use std::sync::Arc;
@@ -137,6 +139,18 @@ pub enum Study {
         /// Whether to draw the curves and sample them.
         curves: bool,
     },
+    /// The best technique on each dataset, and whom it cannot be told from: winners.
+    Winners {
+        /// Datasets, by id.
+        datasets: Vec<String>,
+    },
+    /// How often a radius and what two images share disagree: overlap.
+    Overlap {
+        /// Generated places whose recipe asks for `overlap`.
+        worlds: Vec<String>,
+        /// Radii in metres.
+        radii: Vec<f64>,
+    },
     /// Inliers of near and far pairs of images: verification.
     Verification {
         /// A scene of 7-Scenes, by id.
@@ -230,6 +244,14 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         }
         Study::Verification { dataset, pairs, methods } => {
             verification::run(&mut table, dataset, *pairs, methods, context)?
+        }
+        Study::Winners { datasets } => {
+            winners::run(&mut table, datasets, context)?;
+            None
+        }
+        Study::Overlap { worlds, radii } => {
+            overlap::run(&mut table, worlds, radii, context)?;
+            None
         }
         Study::Worlds(worlds) => worlds::run(&mut table, worlds, context)?,
         Study::Roc { datasets, curves } => roc::run(&mut table, datasets, *curves, context)?,
