@@ -13,6 +13,8 @@ use vpr_report::cli;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    #[command(flatten)]
+    quiet: cli::Quiet,
 }
 
 #[derive(Subcommand)]
@@ -23,15 +25,25 @@ enum Command {
     Gap(Box<command::gap::GapArgs>),
     /// Draw what fine-tuning makes of an image
     Augment(command::augment::AugmentArgs),
+    /// Make the weights that experiment files name
+    Train(command::train::TrainArgs),
     /// Run experiment files and compare them with the numbers of the thesis
     Run(cli::RunArgs),
+    #[command(flatten)]
+    Shell(cli::Shell),
 }
 
 fn main() -> ExitCode {
-    cli::main(|| match Cli::parse().command {
-        Command::Finetune(args) => command::finetune::run(&args),
-        Command::Gap(args) => command::gap::run(&args),
-        Command::Augment(args) => command::augment::run(&args),
-        Command::Run(args) => command::run::run(&args),
+    cli::main(|| {
+        let Cli { command, quiet } = Cli::parse();
+        quiet.heed();
+        match command {
+            Command::Finetune(args) => command::finetune::run(&args),
+            Command::Gap(args) => command::gap::run(&args),
+            Command::Augment(args) => command::augment::run(&args),
+            Command::Train(args) => command::train::run(&args),
+            Command::Run(args) => command::run::run(&args),
+            Command::Shell(args) => args.run::<Cli>(),
+        }
     })
 }

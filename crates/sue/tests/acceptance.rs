@@ -3,13 +3,12 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::{
-    fs,
-    path::PathBuf,
-    process::{Command, Output},
-};
+mod program;
+
+use std::{fs, path::PathBuf, process::Output};
 
 use ndarray::{Array2, array};
+use program::{assert_refused, stderr, success, sue};
 use serde_json::Value;
 use tempfile::TempDir;
 use vpr_core::{
@@ -62,9 +61,7 @@ impl Road {
     }
 
     fn sue(&self, arguments: &str) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_sue"));
-        command.current_dir(self.folder.path()).args(arguments.split_whitespace());
-        command.env_remove("VPR_DATA").output().expect("the program starts")
+        sue(self.folder.path(), &arguments.split_whitespace().collect::<Vec<_>>())
     }
 
     /// `command` on `map` and `queries` with their poses, then these arguments.
@@ -73,30 +70,6 @@ impl Road {
         self.sue(&format!(
             "{command} --map {map} --map-poses poses.csv --queries {queries} {truth} -k 3 {more}"
         ))
-    }
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).expect("UTF-8")
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).expect("UTF-8")
-}
-
-fn success(output: &Output) -> String {
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
-    stdout(output)
-}
-
-/// Asserts exit code 2, nothing on stdout, and one line that contains all of these.
-fn assert_refused(output: &Output, parts: &[&str]) {
-    let text = stderr(output);
-    assert_eq!(output.status.code(), Some(2), "{text}");
-    assert_eq!(stdout(output), "");
-    assert_eq!(text.lines().count(), 1, "{text}");
-    for part in parts {
-        assert!(text.contains(part), "`{part}` is not in: {text}");
     }
 }
 

@@ -2,6 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod program;
+
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -9,6 +11,7 @@ use std::{
 };
 
 use ndarray::{Array2, array};
+use program::{assert_refused, success, sue};
 use serde_json::Value;
 use tempfile::TempDir;
 use vpr_core::{
@@ -67,9 +70,7 @@ impl World {
     }
 
     fn run(&self, arguments: &[&str]) -> Output {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_sue"));
-        command.current_dir(self.folder.path()).args(arguments).env_remove("VPR_DATA");
-        command.output().expect("the program starts")
+        sue(self.folder.path(), arguments)
     }
 
     /// Standard arguments, then these.
@@ -85,30 +86,6 @@ impl World {
         ];
         arguments.extend(more);
         self.run(&arguments)
-    }
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).expect("UTF-8")
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).expect("UTF-8")
-}
-
-fn success(output: &Output) -> String {
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
-    stdout(output)
-}
-
-/// Asserts exit code 2 and a one-line error that contains all of these.
-fn assert_refused(output: &Output, parts: &[&str]) {
-    let text = stderr(output);
-    assert_eq!(output.status.code(), Some(2), "{text}{}", stdout(output));
-    assert!(text.starts_with("error: "), "{text}");
-    assert_eq!(text.lines().count(), 1, "{text}");
-    for part in parts {
-        assert!(text.contains(part), "`{part}` is not in: {text}");
     }
 }
 
@@ -311,6 +288,45 @@ fn wrong_input_is_refused_with_what_and_where() {
         &world.run(&["estimate", "--map", "garbage.safetensors", "--queries", "queries.npy"]),
         &["garbage.safetensors"],
     );
+}
+
+#[test]
+fn what_cannot_be_written_is_said_before_the_work() {
+    let world = World::new();
+    fs::create_dir(world.path("folder")).unwrap();
+    // A map that is not there would be found by the work.
+    let on = |command: &str, flag: &str, path: &str| {
+        let input = ["--map", "nowhere.npy", "--queries", "queries.npy"];
+        world.run(&[&[command], input.as_slice(), &[flag, path]].concat())
+    };
+    for (command, flag) in
+        [("estimate", "--out"), ("evaluate", "--report"), ("calibrate", "--report")]
+    {
+        assert_refused(&on(command, flag, "folder"), &["folder: is a folder"]);
+        assert_refused(&on(command, flag, "no/x.html"), &["no/x.html: no is no folder"]);
+    }
+    assert_refused(&world.run(&["train", "btl", "--output", "folder"]), &["is a folder"]);
+}
+
+#[test]
+fn the_smallest_and_largest_uncertainties_take_few_letters() {
+    let world = World::new();
+    for lambda in ["0.01", "350", "1e5"] {
+        let csv = success(&world.with("estimate", &["--lambda", lambda]));
+        for field in csv.lines().flat_map(|line| line.split(',')) {
+            assert!(field.len() <= 24, "{field}");
+        }
+    }
+}
+
+#[test]
+fn planar_and_spatial_poses_are_told_apart_by_their_files() {
+    let world = World::new();
+    let lines: Vec<String> = (0..N).map(|i| format!("{i},{i},0,1,1,0,0,0\n")).collect();
+    let spatial = "name,x,y,z,qw,qx,qy,qz\n".to_owned() + &lines.concat();
+    fs::write(world.path("spatial.csv"), spatial).unwrap();
+    let more = ["--query-poses", "spatial.csv", "--map-poses", "poses.csv"];
+    assert_refused(&world.with("evaluate", &more), &["spatial.csv", "poses.csv"]);
 }
 
 #[test]

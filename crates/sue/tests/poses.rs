@@ -2,14 +2,13 @@
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::{
-    fs,
-    path::Path,
-    process::{Command, Output},
-};
+mod program;
+
+use std::fs;
 
 use nalgebra::Vector3;
 use ndarray::Array2;
+use program::{stderr, success, sue};
 use vpr_core::{
     Descriptors, PlanarPosition, Pose, Poses,
     map::{About, Coordinates},
@@ -18,21 +17,6 @@ use vpr_data::exchange::{self, Format, Parts};
 use vpr_files::npy;
 
 const N: usize = 12;
-
-fn sue(folder: &Path, arguments: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sue"));
-    command.current_dir(folder).args(arguments).env_remove("VPR_DATA");
-    command.output().expect("the program starts")
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8(output.stderr.clone()).unwrap()
-}
-
-fn stdout(output: &Output) -> String {
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
-    String::from_utf8(output.stdout.clone()).unwrap()
-}
 
 fn rows(shift: f32) -> Descriptors {
     // Places 0 and 6, 1 and 7, … look alike.
@@ -87,10 +71,10 @@ fn every_file_gives_the_same(parts: &Parts, files: &[(Format, &str)]) {
         let input = ["--map", "d.npy", "--map-poses", file, "--queries", "q.npy", "-k", "3"];
         let flags = ["--poses-format", format.name(), "--lambda", "20"];
         let estimate = sue(folder, &[&["estimate"], input.as_slice(), &flags].concat());
-        estimated.push((format.name(), uncertainties(&stdout(&estimate))));
+        estimated.push((format.name(), uncertainties(&success(&estimate))));
         let queries = ["--query-poses", file, "--resamples", "100", "--format", "csv"];
         let evaluate = sue(folder, &[&["evaluate"], input.as_slice(), &flags, &queries].concat());
-        evaluated.push((format.name(), stdout(&evaluate)));
+        evaluated.push((format.name(), success(&evaluate)));
     }
     let first = &estimated[0].1;
     assert!(first.iter().any(|it| *it > 1.0), "{first:?}");

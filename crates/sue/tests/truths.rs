@@ -5,9 +5,12 @@
 #[path = "../../vpr-data/tests/truth/files.rs"]
 mod files;
 
-use std::{fs, path::Path, process::Command};
+mod program;
+
+use std::{fs, path::Path};
 
 use ndarray::array;
+use program::{assert_refused, success};
 use vpr_files::npy;
 
 /// Descriptors without names, and tables of positions with names.
@@ -34,11 +37,7 @@ fn world() -> tempfile::TempDir {
 }
 
 fn sue(folder: &Path, arguments: &[&str]) -> String {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sue"));
-    let output =
-        command.current_dir(folder).args(arguments).env_remove("VPR_DATA").output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
+    success(&program::sue(folder, arguments))
 }
 
 #[test]
@@ -96,14 +95,8 @@ fn scores_give_the_numbers_of_the_descriptors_they_are_of() {
     ] {
         assert_eq!(uncertainties(flags), expected, "{flags:?}");
     }
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sue"));
     let large = ["estimate", "--estimator", "l2", "--similarities", "large.txt"];
     fs::write(folder.join("large.txt"), "0.5 1\n7 0\n").unwrap();
-    let output = command.current_dir(folder).args(large).output().unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(
-        said.contains("large.txt: row 1: column 0 is 7") && said.contains("--distances"),
-        "{said}"
-    );
+    let said = ["large.txt: row 1: column 0 is 7", "--distances"];
+    assert_refused(&program::sue(folder, &large), &said);
 }

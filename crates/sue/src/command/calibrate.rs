@@ -53,6 +53,7 @@ enum ScopeChoice {
 }
 
 pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
+    args.report.path.iter().try_for_each(|path| cli::check_out(path))?;
     let input = args.input.open(&[args.estimator])?;
     let truth = args.truth.truth(&input)?;
     let retrieval = input.retrieve()?;

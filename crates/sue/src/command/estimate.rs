@@ -69,6 +69,7 @@ impl Sink {
 pub(crate) fn run(args: &EstimateArgs) -> anyhow::Result<Outcome> {
     let is_npy = args.format == OutputFormat::Npy;
     ensure!(!is_npy || args.out.is_some(), "`--format npy` needs `--out`: it is no text");
+    args.out.iter().try_for_each(|path| cli::check_out(path))?;
     let input = args.input.open(&[args.estimator])?;
     // A threshold of an estimator says nothing about variances.
     let origin = args.variances.is_none().then(|| Origin::new(args.estimator, &input));

@@ -44,6 +44,7 @@ pub(crate) struct EvaluateArgs {
 const DIFFERENCE: &str = "paired bootstrap over queries";
 
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
+    args.report.path.iter().try_for_each(|path| cli::check_out(path))?;
     let input = args.input.open(&args.estimator)?;
     let truth = args.truth.truth(&input)?;
     let retrieval = input.retrieve()?;

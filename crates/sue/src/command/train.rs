@@ -154,6 +154,7 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<Outcome> {
     };
     let output = or_default(&args.output, format!("data/models/{name}-default.safetensors"));
     let checkpoints = or_default(&args.checkpoints, format!("target/sue-{name}"));
+    args.output.iter().try_for_each(|path| cli::check_out(path))?;
     let config = DefaultEncoderConfig::new();
     if !args.from.is_file() {
         bail!(
