@@ -13,6 +13,7 @@ mod pr_curves;
 mod range;
 mod recall_curves;
 mod roc;
+mod sheets;
 mod spacing;
 mod swap;
 mod tolerances;
@@ -33,6 +34,7 @@ use vpr_report::{
 
 pub use invariance::Stage;
 pub use platform_speed::TechniqueTiming;
+pub use sheets::Scene;
 use vpr_study::Sources;
 pub use worlds::{Domain, Likeness, Worlds};
 
@@ -139,6 +141,13 @@ pub enum Study {
         /// Whether to draw the curves and sample them.
         curves: bool,
     },
+    /// Contact sheets of what is at hand: figures 3.3, 3.5, 3.7, 3.8, 3.9, 3.12 and 3.16.
+    Sheet {
+        /// What it shows.
+        scene: Scene,
+        /// Datasets, by id.
+        datasets: Vec<String>,
+    },
     /// The best technique on each dataset, and whom it cannot be told from: winners.
     Winners {
         /// Datasets, by id.
@@ -206,6 +215,7 @@ fn panel_of<'a>(figure: &'a mut Figure, title: &str, new: impl FnOnce() -> Panel
 /// Wrong files name themselves; missing ones make absent cells.
 pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Report> {
     let mut table = experiment.table();
+    let mut sheet = None;
     let figure = match &experiment.study {
         Study::Datasets { datasets } => datasets::run(&mut table, datasets, context)?,
         Study::Tolerances { datasets } => tolerances::run(&mut table, datasets, context)?,
@@ -245,6 +255,10 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         Study::Verification { dataset, pairs, methods } => {
             verification::run(&mut table, dataset, *pairs, methods, context)?
         }
+        Study::Sheet { scene, datasets } => {
+            sheet = sheets::run(&mut table, *scene, datasets, context)?;
+            None
+        }
         Study::Winners { datasets } => {
             winners::run(&mut table, datasets, context)?;
             None
@@ -257,5 +271,5 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         Study::Roc { datasets, curves } => roc::run(&mut table, datasets, *curves, context)?,
     };
     experiment.fill_thesis(&mut table);
-    Ok(Report::new(table, figure))
+    Ok(Report { table, figure, sheet })
 }

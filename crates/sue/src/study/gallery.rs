@@ -7,7 +7,7 @@ use vpr_report::{
     page::Sheet,
     table::{Cell, Table},
 };
-use vpr_study::{ContactSheet, Frame, Tile};
+use vpr_study::{ContactSheet, Tile};
 
 use super::{
     Context, first_method,
@@ -38,6 +38,9 @@ const RANKED: usize = 10;
 const NEIGHBORS: usize = 4;
 /// Pairs of figure 5.6.
 const COMPLEMENTS: usize = 6;
+const LEGEND: &str = "Grey: query, with its uncertainty u or the share of queries that are less \
+    uncertain; blue and ✓: correct reference; vermilion and ✗: wrong reference, with the distance d \
+    of descriptors.";
 
 pub(super) fn run(
     table: &mut Table,
@@ -61,12 +64,11 @@ pub(super) fn run(
         Scene::Complements => complements(table, &opened, &scored, &mut sheet),
         Scene::Ranked => ranked(table, &opened, &scored, &mut sheet, context.seed),
     }
-    let Some((queries, references)) = &opened.corpus.images else { return Ok(None) };
     // Pictures of real places are not ours to pass on.
-    if opened.is_real() {
+    if opened.corpus.images.is_none() || opened.is_real() {
         return Ok(None);
     }
-    Ok(Some(sheet.draw(queries, references)?))
+    Ok(Some(sheet.draw(LEGEND)?))
 }
 
 /// Queries from the least to the most uncertain, ties by lower index.
@@ -85,16 +87,18 @@ fn ranks(uncertainty: &[f64]) -> Vec<f64> {
     ranks
 }
 
-/// The query with a remark over its `n` best references with their distances.
+/// The query with a remark over its `n` best references with their distances; nothing without
+/// images.
 fn column(opened: &Labelled, query: usize, n: usize, remark: String) -> Vec<Tile> {
+    let Some((queries, references)) = &opened.corpus.images else { return Vec::new() };
     let retrieval = &opened.corpus.retrieval;
     let correct = |reference: usize| opened.corpus.truth.is_correct(query, reference);
     let ranked = retrieval.indices(query).into_iter().zip(retrieval.distances(query)).take(n);
-    let framed = ranked.map(|(&it, &distance)| Tile {
-        frame: Frame::Reference(it, correct(it)),
-        remark: format!("d {}", short(f64::from(distance))),
+    let framed = ranked.map(|(&it, &distance)| {
+        let remark = format!("d {}", short(f64::from(distance)));
+        Tile::reference(references, it, correct(it), remark)
     });
-    std::iter::once(Tile { frame: Frame::Query(query), remark }).chain(framed).collect()
+    std::iter::once(Tile::query(queries, query, remark)).chain(framed).collect()
 }
 
 /// A number in few letters.

@@ -30,22 +30,44 @@ const QUERY: Rgb<u8> = Rgb([120, 120, 120]);
 const CORRECT: Rgb<u8> = Rgb([0, 114, 178]);
 const WRONG: Rgb<u8> = Rgb([213, 94, 0]);
 
-/// One image and the colour around it.
+/// The colour around an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Frame {
-    /// A query, by index, grey.
-    Query(usize),
-    /// A reference, by index; blue with ✓ if it is correct, vermilion with ✗ if not.
-    Reference(usize, bool),
+    /// Grey: an image that is neither right nor wrong.
+    Neutral,
+    /// Blue, with ✓ before the name: a correct reference.
+    Correct,
+    /// Vermilion, with ✗ before the name: a wrong reference.
+    Wrong,
 }
 
 /// A framed image and what is said below it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tile {
-    /// The image.
+    /// The file.
+    pub image: PathBuf,
+    /// What it is; about 12 letters.
+    pub name: String,
+    /// Its frame.
     pub frame: Frame,
     /// A distance, an uncertainty; about 15 letters.
     pub remark: String,
+}
+
+impl Tile {
+    /// A query, by its index among the images.
+    #[must_use]
+    pub fn query(images: &[PathBuf], index: usize, remark: String) -> Self {
+        let name = format!("query {index}");
+        Self { image: images[index].clone(), name, frame: Frame::Neutral, remark }
+    }
+
+    /// A reference, by its index among the images.
+    #[must_use]
+    pub fn reference(images: &[PathBuf], index: usize, correct: bool, remark: String) -> Self {
+        let frame = if correct { Frame::Correct } else { Frame::Wrong };
+        Self { image: images[index].clone(), name: format!("ref {index}"), frame, remark }
+    }
 }
 
 /// Rows of tiles with a title each.
@@ -60,6 +82,12 @@ struct Row {
 }
 
 impl ContactSheet {
+    /// Whether nothing was added.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
     /// Adds tiles side by side under a title.
     pub fn add_row(&mut self, title: impl Into<String>, tiles: Vec<Tile>) {
         self.0.push(Row { title: title.into(), tiles });
@@ -75,24 +103,21 @@ impl ContactSheet {
         }
     }
 
-    /// Draws all tiles into a PNG file.
+    /// Draws all tiles into a PNG file; the legend says what the colours and remarks mean.
     ///
     /// # Errors
     ///
     /// The first image that cannot be read, by its path.
-    pub fn draw(&self, queries: &[PathBuf], references: &[PathBuf]) -> Result<page::Sheet> {
-        let canvas = self.canvas(queries, references)?;
+    pub fn draw(&self, legend: &'static str) -> Result<page::Sheet> {
+        let canvas = self.canvas()?;
         let mut png = Vec::new();
         PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::NoFilter)
             .write_image(&canvas, canvas.width(), canvas.height(), ExtendedColorType::Rgb8)
             .map_err(|cause| Error::format("contact sheet", "image", cause.to_string()))?;
-        let legend = "Grey: query, with its uncertainty u or the share of queries that are less \
-            uncertain; blue and ✓: correct reference; vermilion and ✗: wrong reference, with the \
-            distance d of descriptors.";
         Ok(page::Sheet { png, legend })
     }
 
-    fn canvas(&self, queries: &[PathBuf], references: &[PathBuf]) -> Result<RgbImage> {
+    fn canvas(&self) -> Result<RgbImage> {
         let side = |n: usize| u32::try_from(n).unwrap_or(0);
         let step = TILE.0 + 2 * BORDER + GAP;
         let columns = self.0.iter().map(|row| row.tiles.len()).max().unwrap_or(0);
@@ -115,14 +140,13 @@ impl ContactSheet {
                 row.tiles.iter().enumerate().map(move |(x, it)| (GAP + side(x) * step, top, it))
             })
             .collect();
-        let tiles: Vec<Result<RgbImage>> =
-            places.par_iter().map(|(_, _, it)| tile(it.frame, queries, references)).collect();
+        let tiles: Vec<Result<RgbImage>> = places.par_iter().map(|(_, _, it)| framed(it)).collect();
         for ((x, y, it), tile) in places.iter().zip(tiles) {
             imageops::replace(&mut canvas, &tile?, i64::from(*x), i64::from(*y));
             let (name, colour) = match it.frame {
-                Frame::Query(query) => (format!("query {query}"), INK),
-                Frame::Reference(reference, true) => (format!("✓ ref {reference}"), CORRECT),
-                Frame::Reference(reference, false) => (format!("✗ ref {reference}"), WRONG),
+                Frame::Neutral => (it.name.clone(), INK),
+                Frame::Correct => (format!("✓ {}", it.name), CORRECT),
+                Frame::Wrong => (format!("✗ {}", it.name), WRONG),
             };
             let below = y + TILE.1 + 2 * BORDER + 3;
             let fits = |text: &str| -> String {
@@ -139,13 +163,13 @@ impl ContactSheet {
 }
 
 /// One image with its frame.
-fn tile(frame: Frame, queries: &[PathBuf], references: &[PathBuf]) -> Result<RgbImage> {
-    let (path, colour) = match frame {
-        Frame::Query(query) => (&queries[query], QUERY),
-        Frame::Reference(reference, true) => (&references[reference], CORRECT),
-        Frame::Reference(reference, false) => (&references[reference], WRONG),
+fn framed(tile: &Tile) -> Result<RgbImage> {
+    let colour = match tile.frame {
+        Frame::Neutral => QUERY,
+        Frame::Correct => CORRECT,
+        Frame::Wrong => WRONG,
     };
-    let image = vpr_vision::image::decode(path)?;
+    let image = vpr_vision::image::decode(&tile.image)?;
     let side = |it: usize| u32::try_from(it).unwrap_or(u32::MAX);
     let (width, height) = (side(image.width()), side(image.height()));
     let pixels = image.as_slice().to_vec();
@@ -172,12 +196,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("grey.png");
         RgbImage::from_pixel(32, 24, Rgb([200; 3])).save(&path).unwrap();
-        let tile = |frame| Tile { frame, remark: "d 0.812".to_owned() };
-        let mut sheet = ContactSheet::default();
-        let column = |correct| vec![tile(Frame::Query(0)), tile(Frame::Reference(0, correct))];
-        sheet.add_columns("SUE: least and most uncertain", vec![column(true), column(false)]);
         let paths = [path];
-        let canvas = sheet.canvas(&paths, &paths).unwrap();
+        let remark = || "d 0.812".to_owned();
+        let mut sheet = ContactSheet::default();
+        let column = |correct| {
+            vec![Tile::query(&paths, 0, remark()), Tile::reference(&paths, 0, correct, remark())]
+        };
+        sheet.add_columns("SUE: least and most uncertain", vec![column(true), column(false)]);
+        let canvas = sheet.canvas().unwrap();
         // A title, two rows of two tiles: nothing stands outside, and every row has its text.
         let (tile_width, tile_height) = (TILE.0 + 2 * BORDER, TILE.1 + 2 * BORDER);
         let top = GAP + 2 * font::LINE + GAP;
