@@ -31,17 +31,40 @@ enum Network {
     Stun,
     /// `data/models/copr-default.safetensors`
     CoprRegressor,
+    /// `data/models/rsf-rail.safetensors` and what it is held against in chapter 4
+    RsfRail,
+    /// `data/models/rsf-archive.safetensors` and what it is held against
+    RsfArchive,
+    /// `data/models/rsf-street.safetensors` and what it is held against
+    RsfStreet,
+    /// `data/models/rsf-eynsham.safetensors` and what it is held against
+    RsfEynsham,
 }
+
+/// `rsf train` with the experiments that say how; the place follows.
+const RSF: [&str; 6] = [
+    "train",
+    "--experiment",
+    "experiments/table-4.3.toml",
+    "experiments/table-4.5.toml",
+    "experiments/table-4.6.toml",
+    "--place",
+];
 
 /// Runs the program and passes its exit code on.
 pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let (program, words): (_, &[&str]) = match args.network {
-        Network::DefaultEncoder => ("default-encoder", &["train"]),
-        Network::Btl => ("sue", &["train", "btl"]),
-        Network::Stun => ("sue", &["train", "stun"]),
+    let rsf = |place| ("rsf", [&RSF[..], &[place]].concat());
+    let (program, words) = match args.network {
+        Network::DefaultEncoder => ("default-encoder", vec!["train"]),
+        Network::Btl => ("sue", vec!["train", "btl"]),
+        Network::Stun => ("sue", vec!["train", "stun"]),
         Network::CoprRegressor => {
-            ("copr", &["train", "regressor", "--experiment", "experiments/table-6.1.toml"])
+            ("copr", vec!["train", "regressor", "--experiment", "experiments/table-6.1.toml"])
         }
+        Network::RsfRail => rsf("rail"),
+        Network::RsfArchive => rsf("archive"),
+        Network::RsfStreet => rsf("street"),
+        Network::RsfEynsham => rsf("eynsham"),
     };
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let status = Command::new(cargo)

@@ -1,22 +1,16 @@
 //! `rsf finetune`: weights for a map, and whether they are better before a query is seen.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::ensure;
 use rsf::{
     MiningParams, Preset,
-    net::{
-        Finetuning, Material, Outcome as Tuned, Score, Whitening, default_network, finetune,
-        run_log, whiten,
-    },
+    net::{Finetuning, Whitening},
 };
-use vpr_nets::{
-    train::Run,
-    weights::{Precision, save},
-};
-use vpr_report::cli::{self, Outcome};
+use vpr_nets::weights::Precision;
+use vpr_report::cli::Outcome;
 
-use super::map::MapArgs;
+use super::{adaptation::Adaptation, map::MapArgs};
 
 /// Map, settings and output.
 #[derive(clap::Args)]
@@ -44,9 +38,9 @@ pub(crate) struct FinetuneArgs {
     /// How queries are made of references
     #[arg(long, value_enum, default_value_t, value_name = "NAME")]
     augmentations: Preset,
-    /// Most steps
-    #[arg(long, default_value_t = Finetuning::default().steps)]
-    steps: usize,
+    /// Most steps [default: about five passes over the references]
+    #[arg(long)]
+    steps: Option<usize>,
     /// Steps between two minings and validations
     #[arg(long, default_value_t = Finetuning::default().round)]
     round: usize,
@@ -84,44 +78,31 @@ pub(crate) struct FinetuneArgs {
 
 pub(crate) fn run(args: &FinetuneArgs) -> anyhow::Result<Outcome> {
     ensure!(args.method == "default", "`{}`: only `default` can be tuned here", args.method);
-    let settings = args.settings();
+    let mut settings = args.settings();
     settings.check()?;
     let (set, name) = args.map.open()?;
-    let material = Material::open(&set)?;
-    let (network, digest) = default_network(args.weights.as_deref())?;
-    let precision = if args.half { Precision::Half } else { Precision::Single };
+    settings.steps = args.steps.unwrap_or_else(|| settings.steps_for(set.len()));
+    let adaptation = Adaptation {
+        name: &name,
+        set: &set,
+        weights: args.weights.as_deref(),
+        output: &args.output,
+        checkpoints: args.checkpoints.as_deref(),
+        precision: if args.half { Precision::Half } else { Precision::Single },
+    };
     if args.whitening {
         let Finetuning { augmentations, seed, .. } = settings;
-        let whitening = Whitening { augmentations, seed, ..Whitening::default() };
-        let fitted = whiten(&whitening, network, &material)?;
-        let facts = [
-            ("whitened_from", digest),
-            ("references", format!("{}, digest {}", material.len(), material.digest())),
-            ("variants", format!("{}, {}", whitening.variants, augmentations.key())),
-            ("seed", seed.to_string()),
-            ("licence", "MIT OR Apache-2.0".to_owned()),
-        ];
-        save(&fitted, &args.output, &facts, precision)?;
-        cli::note(&format!("{name}: whitened, {}", args.output.display()));
-        return Ok(Outcome::Success);
+        adaptation.whiten(&Whitening { augmentations, seed, ..Whitening::default() })?;
+    } else {
+        adaptation.finetune(&settings)?;
     }
-    let stem = args.output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let folder = args.checkpoints.clone();
-    let folder = folder.unwrap_or_else(|| Path::new("target").join(format!("rsf-{stem}")));
-    let mut facts = settings.facts(&material, &digest);
-    let mut run = Run::open(&folder, &facts, run_log(&args.output.with_extension("log.csv")))?;
-    let tuned = finetune(&settings, network, (&set, &material), &mut run, &folder, show)?;
-    facts.push(("best", format!("step {}, {}", tuned.best_step, told(tuned.best))));
-    save(&tuned.network, &args.output, &facts, precision)?;
-    cli::note(&verdict(&tuned));
-    cli::note(&format!("{name}: {}", args.output.display()));
     Ok(Outcome::Success)
 }
 
 impl FinetuneArgs {
     fn settings(&self) -> Finetuning {
         Finetuning {
-            steps: self.steps,
+            steps: self.steps.unwrap_or(self.round),
             round: self.round,
             patience: self.patience,
             batch: self.batch,
@@ -139,26 +120,4 @@ impl FinetuneArgs {
             ..Finetuning::default()
         }
     }
-}
-
-fn told(score: Score) -> String {
-    format!("R@1 {:.3} of {} held-out variants, gap {:.4}", score.recall, score.n, score.gap)
-}
-
-/// Whether the map itself says that it was worth it.
-fn verdict(tuned: &Tuned) -> String {
-    let Tuned { best_step, best, before, .. } = tuned;
-    if *best_step == 0 {
-        return "no round was better on held-out references: the weights are those it began with"
-            .to_owned();
-    }
-    format!("before: {}\nstep {best_step}: {}", told(*before), told(*best))
-}
-
-#[expect(clippy::unnecessary_wraps, reason = "what fine-tuning calls")]
-fn show(step: usize, loss: f64, score: Score) -> vpr_core::Result<()> {
-    // Before the first step there is no loss.
-    let loss = if step == 0 { String::new() } else { format!("loss {loss:.4}, ") };
-    cli::note(&format!("step {step}: {loss}{}", told(score)));
-    Ok(())
 }

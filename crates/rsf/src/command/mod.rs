@@ -1,7 +1,9 @@
 //! One file per subcommand.
 
+mod adaptation;
 pub(crate) mod augment;
 pub(crate) mod finetune;
 pub(crate) mod gap;
 mod map;
 pub(crate) mod run;
+pub(crate) mod train;

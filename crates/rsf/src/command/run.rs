@@ -7,7 +7,7 @@ use vpr_report::cli::{self, Bar, Outcome, RunArgs};
 use vpr_study::Sources;
 
 /// The name by which experiment files call this program.
-const CHAPTER: &str = "rsf";
+pub(crate) const CHAPTER: &str = "rsf";
 
 pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     let experiments = args.open::<Study>(CHAPTER)?;

@@ -10,7 +10,7 @@ mod tests;
 mod trial;
 mod whitening;
 
-pub use finetune::{Finetuning, Outcome, finetune, run_log};
+pub use finetune::{Finetuning, Outcome, finetune, last, run_log};
 pub use lessons::{Lessons, TripletBatch};
 pub use material::{Material, default_network};
 pub use student::Student;

@@ -70,13 +70,7 @@ fn moved(before: &[(String, Vec<f32>)], after: &[(String, Vec<f32>)]) -> Vec<Str
 
 /// The weights after the last step, whether they were best or not.
 fn last_weights(settings: &Finetuning, folder: &Path) -> Vec<(String, Vec<f32>)> {
-    let (start, _) = default_network(None).unwrap();
-    let student = Student::new(start, settings.margin, &settings.frozen).unwrap();
-    let checkpoint = vpr_nets::train::Checkpoint::new(folder);
-    let state = checkpoint.load(student, vpr_nets::train::Optimizer::Adam.init()).unwrap();
-    let (step, student, _) = state.unwrap();
-    assert_eq!(step, settings.steps);
-    weights(student.network())
+    weights(&last(settings, folder).unwrap())
 }
 
 #[test]

@@ -12,7 +12,10 @@ use vpr_worlds::{Side, World, is_world, named_recipe};
 
 pub use gaps::{Gap, gap};
 
-use crate::{ReferenceSet, Result};
+use crate::{
+    ReferenceSet, Result,
+    net::{Finetuning, Whitening},
+};
 
 /// What to compute; the key `kind` of `[study]` chooses.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -46,6 +49,9 @@ pub struct Place {
     pub dataset: String,
     /// What stands for `{place}` in paths of weights.
     pub key: String,
+    /// What stands for `{foreign}`: the key of another place, whose references are none of this one.
+    #[serde(default)]
+    pub foreign: Option<String>,
 }
 
 /// The default network with some weights.
@@ -54,10 +60,29 @@ pub struct Place {
 pub struct Encoder {
     /// Name in tables.
     pub name: String,
-    /// Its weights, relative to a data folder, `{place}` for the key of the place; those that every
-    /// clone has if there are none.
+    /// Its weights, relative to a data folder, `{place}` for the key of the place and `{foreign}` for
+    /// that of another; those that every clone has if there are none.
     #[serde(default)]
     pub weights: Option<String>,
+    /// How `rsf train` makes them: fine-tuning of the place's references, with these settings.
+    #[serde(default)]
+    pub tuned: Option<Finetuning>,
+    /// How `rsf train` makes them: another projection.
+    #[serde(default)]
+    pub whitened: Option<Whitening>,
+    /// Poses of the references are not told to the fine-tuning.
+    #[serde(default)]
+    pub without_poses: bool,
+}
+
+impl Encoder {
+    /// Its weights for a place; `None` for those that every clone has.
+    #[must_use]
+    pub fn weights_for(&self, place: &Place) -> Option<String> {
+        let foreign = place.foreign.as_deref().unwrap_or("{foreign}");
+        let weights = self.weights.as_ref()?;
+        Some(weights.replace("{place}", &place.key).replace("{foreign}", foreign))
+    }
 }
 
 /// Computes what the experiment asks for, as far as its data is at hand.

@@ -1,18 +1,31 @@
 //! Recall@N of the default network with several weights.
 
-use std::{path::Path, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
-use vpr_core::metrics::{
-    Discordant, McNemar,
-    bootstrap::{Z_95, wilson_interval},
+use vpr_core::{
+    map::BlockDigest,
+    metrics::{
+        Discordant, McNemar,
+        bootstrap::{Z_95, wilson_interval},
+    },
 };
 use vpr_data::Dataset;
-use vpr_nets::encode::by_name;
+use vpr_nets::{
+    encode::by_name,
+    train::Run,
+    weights::{Precision, save},
+};
 use vpr_report::table::{Cell, Table};
 use vpr_study::{Direction, Network, Runner, Sources};
 
-use super::{Encoder, Place};
-use crate::Result;
+use super::{Encoder, Place, references};
+use crate::{
+    Result,
+    net::{Material, default_network, finetune, last, run_log},
+};
 
 pub(super) fn run(
     table: &mut Table,
@@ -103,12 +116,11 @@ fn adapted(
     encoder: &Encoder,
     sources: &Sources<'_>,
 ) -> Result<Result<Runner, String>> {
-    let path = match &encoder.weights {
-        None => None,
+    let path = match encoder.weights_for(place) {
+        None => tuned_now(place, encoder, sources)?,
         Some(weights) => {
-            let weights = weights.replace("{place}", &place.key);
             let Some(path) = sources.locate(Path::new(&weights))? else {
-                return Ok(Err(format!("{weights} is not at hand; `rsf finetune` makes it")));
+                return Ok(Err(format!("{weights} is not at hand; `rsf train` makes it")));
             };
             Some(path)
         }
@@ -120,4 +132,21 @@ fn adapted(
         encoder: encoder.name.clone(),
         technique: Arc::new(Network::new(network.into())),
     }))
+}
+
+/// Weights after the last step of a row that is tuned while the table is made, in the cache; `None`
+/// for one that is not.
+fn tuned_now(place: &Place, encoder: &Encoder, sources: &Sources<'_>) -> Result<Option<PathBuf>> {
+    let Some(settings) = &encoder.tuned else { return Ok(None) };
+    let Some(set) = references(sources, &place.dataset)? else { return Ok(None) };
+    let material = Material::open(&set)?;
+    let (network, digest) = default_network(None)?;
+    let facts = settings.facts(&material, &digest);
+    let name = format!("rsf-{}", BlockDigest::of(format!("{facts:?}").as_bytes()).to_hex());
+    let folder = sources.cache().join(name);
+    let mut run = Run::open(&folder, &facts, run_log(&folder.join("log.csv")))?;
+    finetune(settings, network, (&set, &material), &mut run, &folder, |_, _, _| Ok(()))?;
+    let path = folder.join("last.safetensors");
+    save(&last(settings, &folder)?, &path, &facts, Precision::Single)?;
+    Ok(Some(path))
 }
