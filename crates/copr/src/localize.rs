@@ -101,14 +101,16 @@ impl PoseErrors {
     ///
     /// [`CoreError::Mismatch`] if they are not of as many queries; those of [`paired_bootstrap`].
     pub fn mte_against(&self, other: &Self, resampling: &Resampling) -> Result<Interval> {
-        if self.len() != other.len() {
-            let what = "queries of two localizations";
-            let (expected, actual) = (self.len(), other.len());
-            return Err(CoreError::Mismatch { what, expected, actual }.into());
-        }
-        let of =
-            |errors: &'_ Self, queries: &[usize]| median(&pick(&errors.translation_m, queries));
-        Ok(paired_bootstrap(self.len(), resampling, |it| of(self, it), |it| of(other, it))?)
+        difference(&self.translation_m, &other.translation_m, resampling)
+    }
+
+    /// The same of the median rotation error, in degrees.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`Self::mte_against`].
+    pub fn mre_against(&self, other: &Self, resampling: &Resampling) -> Result<Interval> {
+        difference(&self.rotation_deg, &other.rotation_deg, resampling)
     }
 
     /// Queries that are at most this far off and this much turned.
@@ -116,6 +118,17 @@ impl PoseErrors {
         let both = self.translation_m.iter().zip(&self.rotation_deg);
         both.filter(|(far, turned)| **far <= metres && **turned <= degrees).count()
     }
+}
+
+/// Difference of the medians of two lists over the same queries.
+fn difference(ours: &[f64], theirs: &[f64], resampling: &Resampling) -> Result<Interval> {
+    if ours.len() != theirs.len() {
+        let what = "queries of two localizations";
+        let (expected, actual) = (ours.len(), theirs.len());
+        return Err(CoreError::Mismatch { what, expected, actual }.into());
+    }
+    let of = |errors: &[f64], queries: &[usize]| median(&pick(errors, queries));
+    Ok(paired_bootstrap(ours.len(), resampling, |it| of(ours, it), |it| of(theirs, it))?)
 }
 
 /// Distance between two cameras, metres.

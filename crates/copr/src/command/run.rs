@@ -18,7 +18,8 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     let without = sources.without_weights()?;
     let mut outcome = Outcome::Success;
     for experiment in &experiments {
-        let context = Context { sources: &sources, bare: &bare, seed: experiment.seed };
+        let (seed, timings) = (experiment.seed, args.output.timings);
+        let context = Context { sources: &sources, bare: &bare, seed, timings };
         let report = study::run(experiment, context)?;
         outcome = outcome.and(cli::finish(experiment, &report, &args.output, &without)?);
     }

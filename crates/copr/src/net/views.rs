@@ -1,14 +1,15 @@
-//! Images with poses in several rooms: what an encoder learns from.
+//! Images with poses in several rooms: what the head of an encoder learns from.
 
 use std::{ops::Range, path::PathBuf};
 
+use ndarray::{Array2, ArrayView1, Axis, concatenate};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use vpr_core::{Definition, Error as CoreError, Pose, map::BlockDigest};
 use vpr_nets::{
-    model::default::INPUT,
+    model::default::{DefaultEncoder, INPUT},
     regress::RELATIVE_POSE,
-    train::{Album, augment, planes},
+    train::{Album, planes, variants},
 };
 
 use super::relative_pose;
@@ -17,10 +18,14 @@ use crate::{Result, regression::narrow, rotation_error, translation_error};
 /// How often a pair is drawn that is near enough before any is taken.
 const DRAWS: usize = 200;
 
-/// Images of rooms, decoded, at the size that the network takes.
+/// Images that go through the network at a time.
+const BATCH: usize = 32;
+
+/// Images of rooms as the trunk of a network sees them, once as they are and in variants.
 #[derive(Clone, Debug)]
 pub struct Views {
-    album: Album,
+    /// One row an image and version, all images of a version after those of the one before.
+    features: Array2<f32>,
     poses: Vec<Pose>,
     rooms: Vec<Range<usize>>,
 }
@@ -34,12 +39,11 @@ pub struct Reach {
     pub degrees: f64,
 }
 
-/// Images of pairs: first all firsts, then all seconds, then, if asked for, an image of another room
-/// for each.
+/// Pairs: first all firsts, then all seconds, then, if asked for, an image of another room for each.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ViewBatch {
-    /// `parts · n × 3 × height × width` values in 0 to 1.
-    pub images: Vec<f32>,
+    /// `parts · n × features`, what the trunk makes of images.
+    pub features: Vec<f32>,
     /// `n` distances between the cameras of a pair, metres.
     pub metres: Vec<f32>,
     /// `n × 7`: the second camera seen from the first, see [`relative_pose`].
@@ -49,13 +53,18 @@ pub struct ViewBatch {
 }
 
 impl Views {
-    /// Decodes the images of rooms: paths and poses of each.
+    /// Shows the images of rooms, paths and poses of each, to the trunk of a network: as they are, and
+    /// `n_variants` times changed as in its training ([`variants`]).
     ///
     /// # Errors
     ///
     /// [`CoreError::Empty`] if a room has fewer than two images, [`CoreError::Mismatch`] if it has not as
     /// many poses; the first image that cannot be read, by its path.
-    pub fn open(rooms: &[(Vec<PathBuf>, Vec<Pose>)]) -> Result<Self> {
+    pub fn open(
+        rooms: &[(Vec<PathBuf>, Vec<Pose>)],
+        network: &DefaultEncoder,
+        (n_variants, seed): (usize, u64),
+    ) -> Result<Self> {
         let (mut paths, mut poses, mut ranges) = (Vec::new(), Vec::new(), Vec::new());
         for (images, at) in rooms {
             if images.len() < 2 {
@@ -77,7 +86,14 @@ impl Views {
             .chunks(3 * plane)
             .flat_map(|image| (0..3 * plane).map(move |at| byte(image[at % 3 * plane + at / 3])));
         let album = Album::new(pixels.collect(), INPUT)?;
-        Ok(Self { album, poses, rooms: ranges })
+        let mut versions = vec![network.pooled(&values, INPUT, BATCH)?];
+        for version in 0..n_variants {
+            let changed = variants(&album, INPUT, seed.wrapping_add(version as u64));
+            versions.push(network.pooled(&changed, INPUT, BATCH)?);
+        }
+        let parts: Vec<_> = versions.iter().map(|it| it.view()).collect();
+        let features = concatenate(Axis(0), &parts).map_err(|_| CoreError::Empty("features"))?;
+        Ok(Self { features, poses, rooms: ranges })
     }
 
     /// Number of images.
@@ -101,10 +117,7 @@ impl Views {
     /// Stands for images, poses and rooms.
     #[must_use]
     pub fn digest(&self) -> String {
-        let mut bytes: Vec<u8> = Vec::new();
-        for image in 0..self.len() {
-            bytes.extend(BlockDigest::of(self.album.get(image).bytes).to_hex().into_bytes());
-        }
+        let mut bytes: Vec<u8> = self.features.iter().flat_map(|it| it.to_le_bytes()).collect();
         for pose in &self.poses {
             let parts = pose.translation.vector.iter().chain(pose.rotation.coords.iter());
             bytes.extend(parts.flat_map(|it| it.to_le_bytes()));
@@ -114,8 +127,7 @@ impl Views {
     }
 
     /// `n` pairs, each of one room: a function of `seed` and `step` alone. With `others` each comes
-    /// with an image of another room; with `changed` every image is changed as in training
-    /// ([`augment`]), otherwise it stays as it is.
+    /// with an image of another room. Every image is seen in any of its versions.
     ///
     /// # Errors
     ///
@@ -125,7 +137,7 @@ impl Views {
         (seed, step): (u64, usize),
         n: usize,
         reach: Reach,
-        (others, changed): (bool, bool),
+        others: bool,
     ) -> vpr_core::Result<ViewBatch> {
         if others && self.rooms.len() < 2 {
             return Err(CoreError::Empty("other rooms: negatives need two rooms"));
@@ -148,21 +160,15 @@ impl Views {
             }
         }
         debug_assert_eq!(batch.relative.len(), n * RELATIVE_POSE);
-        let each = 3 * INPUT.0 * INPUT.1;
-        let images = [firsts, seconds, thirds].concat();
-        batch.images = vec![0.0; images.len() * each];
-        for (image, output) in images.into_iter().zip(batch.images.chunks_mut(each)) {
-            let pixels = self.album.get(image);
-            if changed {
-                augment(pixels, INPUT, random.random(), output);
-            } else {
-                let plane = INPUT.0 * INPUT.1;
-                for (at, &value) in pixels.bytes.iter().enumerate() {
-                    output[at % 3 * plane + at / 3] = f32::from(value) / 255.0;
-                }
-            }
+        for image in [firsts, seconds, thirds].concat() {
+            batch.features.extend(self.version(image, &mut random));
         }
         Ok(batch)
+    }
+
+    fn version(&self, image: usize, random: &mut ChaCha8Rng) -> ArrayView1<'_, f32> {
+        let version = random.random_range(0..self.features.nrows() / self.len());
+        self.features.row(version * self.len() + image)
     }
 
     /// Two images of a room that are near enough, or, where none is found, any two.
@@ -221,38 +227,49 @@ pub(super) mod tests {
         (0..2).map(room).collect()
     }
 
+    pub(in crate::net) fn seen(folder: &Path, n: usize) -> Result<Views> {
+        let (network, _) = crate::net::default_network()?;
+        Views::open(&rooms(folder, n), &network, (1, 7))
+    }
+
     #[test]
     fn pairs_stay_in_their_room_and_negatives_do_not() {
         let folder = tempfile::tempdir().unwrap();
-        let views = Views::open(&rooms(folder.path(), 12)).unwrap();
+        let views = seen(folder.path(), 12).unwrap();
         assert_eq!((views.len(), views.n_rooms()), (24, 2));
         let reach = Reach { metres: 0.3, degrees: 10.0 };
-        let batch = views.batch((3, 5), 40, reach, (true, false)).unwrap();
+        let batch = views.batch((3, 5), 40, reach, true).unwrap();
         assert!(batch.metres.iter().all(|it| *it > 0.0 && *it <= 0.31), "{:?}", batch.metres);
-        let each = 3 * INPUT.0 * INPUT.1;
-        let is_bright = |number: usize| batch.images[number * each] > 0.4;
+        let width = batch.features.len() / 120;
+        let room = |number: usize| {
+            let found = &batch.features[number * width..][..width];
+            let is_it = |row: usize| views.features.row(row).iter().eq(found);
+            (0..views.features.nrows()).find(|row| is_it(*row)).unwrap() % 24 / 12
+        };
         for pair in 0..40 {
-            assert_eq!(is_bright(pair), is_bright(40 + pair));
-            assert_ne!(is_bright(pair), is_bright(80 + pair));
+            assert_eq!(room(pair), room(40 + pair));
+            assert_ne!(room(pair), room(80 + pair));
             let (metres, x) = (batch.metres[pair], batch.relative[RELATIVE_POSE * pair]);
             approx::assert_abs_diff_eq!(metres, x.abs(), epsilon = 1e-6);
         }
-        assert_eq!(batch, views.batch((3, 5), 40, reach, (true, false)).unwrap());
-        assert_ne!(batch, views.batch((3, 6), 40, reach, (true, false)).unwrap());
+        assert_eq!(batch, views.batch((3, 5), 40, reach, true).unwrap());
+        assert_ne!(batch, views.batch((3, 6), 40, reach, true).unwrap());
     }
 
     #[test]
     fn what_is_no_room_is_refused() {
         let folder = tempfile::tempdir().unwrap();
+        let (network, _) = crate::net::default_network().unwrap();
+        let open = |all: &[_]| Views::open(all, &network, (0, 0));
         let mut all = rooms(folder.path(), 3);
         all.truncate(1);
-        let one = Views::open(&all).unwrap();
+        let one = open(&all).unwrap();
         let reach = Reach { metres: 9.0, degrees: 180.0 };
-        assert!(one.batch((0, 0), 2, reach, (true, false)).is_err());
-        assert!(one.batch((0, 0), 2, reach, (false, true)).is_ok());
+        assert!(one.batch((0, 0), 2, reach, true).is_err());
+        assert!(one.batch((0, 0), 2, reach, false).is_ok());
         all[0].1.pop();
-        assert!(Views::open(&all).unwrap_err().to_string().contains("poses of the images"));
+        assert!(open(&all).unwrap_err().to_string().contains("poses of the images"));
         all[0].0.truncate(1);
-        assert!(Views::open(&all).is_err());
+        assert!(open(&all).is_err());
     }
 }

@@ -1,6 +1,6 @@
 //! Dense maps in memory and what is retrieved from them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use ndarray::{Axis, concatenate};
 use serde::Deserialize;
@@ -8,8 +8,8 @@ use vpr_core::{Definition, Descriptors, Map, retrieve};
 
 use super::Context;
 use crate::{
-    Control, Controlled, Error, LinearInterpolation, Options, Outside, PlaneFit, PlaneParams,
-    PoseErrors, Regressor, Result, Targets, Told, net::NetworkRegressor, regressed,
+    Control, Controlled, Error, LinearInterpolation, MOST_TARGETS, Options, Outside, PlaneFit,
+    PlaneParams, PoseErrors, Regressor, Result, Targets, Told, net::NetworkRegressor, regressed,
 };
 
 /// How descriptors are regressed.
@@ -38,6 +38,9 @@ pub enum Method {
     Control {
         /// Which.
         control: Control,
+        /// The weights of the H whose rows are shuffled; without them those of a plane are.
+        #[serde(default)]
+        weights: Option<PathBuf>,
     },
 }
 
@@ -69,11 +72,39 @@ impl Method {
             Self::Plane { .. } => "Lin. Reg.",
             Self::Network { renormalise: false, .. } => "Non-lin. Reg.",
             Self::Network { renormalise: true, .. } => "Non-lin. Reg., unit length",
-            Self::Control { control: Control::Random } => "random rows",
-            Self::Control { control: Control::Shuffled } => "shuffled rows",
-            Self::Control { control: Control::Copied } => "anchors copied",
+            Self::Control { control: Control::Random, .. } => "random rows",
+            Self::Control { control: Control::Shuffled, weights: None } => "shuffled rows",
+            Self::Control { control: Control::Shuffled, weights: Some(_) } => {
+                "Non-lin. Reg. shuffled"
+            }
+            Self::Control { control: Control::Copied, .. } => "anchors copied",
         };
         format!("dense map, {name}")
+    }
+
+    /// The same with the weights of a place, where their name says `{place}`.
+    pub(super) fn at(&self, place: &str) -> Self {
+        let of =
+            |weights: &PathBuf| PathBuf::from(weights.to_string_lossy().replace("{place}", place));
+        match self {
+            Self::Network { weights, renormalise } => {
+                Self::Network { weights: of(weights), renormalise: *renormalise }
+            }
+            Self::Control { control, weights: Some(weights) } => {
+                Self::Control { control: *control, weights: Some(of(weights)) }
+            }
+            other => other.clone(),
+        }
+    }
+
+    /// Whether it is H with its own rows, not a control of it.
+    pub(super) fn is_network(&self) -> bool {
+        matches!(self, Self::Network { renormalise: false, .. })
+    }
+
+    /// Whether it is H with its rows shuffled.
+    pub(super) fn is_shuffled_network(&self) -> bool {
+        matches!(self, Self::Control { control: Control::Shuffled, weights: Some(_) })
     }
 
     /// The regressor, or why it is not at hand.
@@ -89,31 +120,41 @@ impl Method {
                 (Box::new(PlaneFit::new(params)?), Some(name_of(definition)))
             }
             Self::Network { weights, renormalise } => {
-                let Some(path) = context.sources.locate(weights)? else {
-                    let weights = weights.display();
-                    return Ok(Err(format!(
-                        "{weights} is not at hand; `copr train regressor` makes it"
-                    )));
-                };
                 options.renormalise = *renormalise;
-                let network = NetworkRegressor::open(&path)?;
+                let network = match network(weights, context)? {
+                    Ok(network) => network,
+                    Err(why) => return Ok(Err(why)),
+                };
                 let definition = name_of(network.definition());
                 (Box::new(network), Some(definition))
             }
-            Self::Control { control } => {
-                let controlled = Controlled {
-                    control: *control,
-                    of: Box::new(PlaneFit::new(PlaneParams {
+            Self::Control { control, weights } => {
+                let of: Box<dyn Regressor> = match weights {
+                    None => Box::new(PlaneFit::new(PlaneParams {
                         outside: Outside::Flat,
                         ..PlaneParams::default()
                     })?),
-                    seed: context.seed,
+                    Some(weights) => match network(weights, context)? {
+                        Ok(network) => Box::new(network),
+                        Err(why) => return Ok(Err(why)),
+                    },
                 };
-                (Box::new(controlled), None)
+                // Rows are shuffled among those of one batch: all of them.
+                options.batch = MOST_TARGETS;
+                (Box::new(Controlled { control: *control, of, seed: context.seed }), None)
             }
         };
         Ok(Ok(Ready { regressor, options, map: self.map(), definition }))
     }
+}
+
+/// The network H with these weights, or why they are not at hand.
+fn network(weights: &Path, context: Context<'_>) -> Result<Result<NetworkRegressor, String>> {
+    let Some(path) = context.sources.locate(weights)? else {
+        let weights = weights.display();
+        return Ok(Err(format!("{weights} is not at hand; `copr train regressor` makes it")));
+    };
+    Ok(Ok(NetworkRegressor::open(&path)?))
 }
 
 /// The errors of taking each query to be where its nearest reference is.

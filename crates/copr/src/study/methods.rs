@@ -35,6 +35,7 @@ impl Setting<'_> {
         row("dense map, oracle", None, None).push_errors(table, &errors, context)?;
         let sparse_errors = localize(self.sparse, queries)?;
         row("sparse map", None, None).push_errors(table, &sparse_errors, context)?;
+        let (mut network, mut shuffled) = (None, None);
         for method in methods {
             let map = method.map();
             let ready = match method.ready(context)? {
@@ -50,9 +51,18 @@ impl Setting<'_> {
                     let row = row(&map, ready.definition, remark(told));
                     row.push_errors(table, &errors, context)?;
                     row.push_gain(table, &errors, &sparse_errors, context)?;
+                    if method.is_network() {
+                        network = Some(errors);
+                    } else if method.is_shuffled_network() {
+                        shuffled = Some(errors);
+                    }
                 }
                 Err(why) => row(&map, ready.definition, None).push_absent(table, &why),
             }
+        }
+        if let (Some(network), Some(shuffled)) = (network, shuffled) {
+            let row = row("dense map, Non-lin. Reg.", None, None);
+            row.push_gain_over_shuffled(table, &network, &shuffled, context)?;
         }
         Ok(sparse_errors)
     }

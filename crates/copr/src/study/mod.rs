@@ -1,16 +1,22 @@
 //! What an experiment file of chapter 6 can ask for, one file per study.
 
 mod dense;
+mod density;
 mod encoder;
 mod encoders;
 mod extrapolation;
+mod footprint;
 mod interpolation;
 mod lanes;
+mod matches;
 mod methods;
 mod place;
 mod real;
 mod rooms;
 mod rows;
+mod sequences;
+mod stray;
+mod viewpoints;
 
 use serde::Deserialize;
 use vpr_core::{Provenance, metrics::bootstrap::Resampling};
@@ -23,8 +29,10 @@ use vpr_study::Sources;
 
 pub use dense::Method;
 pub use encoder::encoder_weights;
+pub use matches::{Classes, Looked};
 pub use place::{Aside, Place};
 pub use rooms::{Paths, Room, Rooms, Scene, Side};
+pub use sequences::{Images, Recorded};
 
 use crate::Result;
 
@@ -72,6 +80,66 @@ pub enum Study {
         /// The generated rooms, once for every encoder.
         rooms: Rooms,
     },
+    /// Times and sizes: table 6.5.
+    Footprint {
+        /// The scene.
+        scene: Scene,
+        /// Distance between targets, metres.
+        step_m: f64,
+        /// The generated room.
+        rooms: Rooms,
+        /// Further places.
+        places: Vec<Place>,
+        /// How descriptors are regressed.
+        method: Method,
+    },
+    /// The sparse map under several encoders: figures 6.6 and 6.7.
+    Viewpoints {
+        /// The scenes.
+        scenes: Vec<Scene>,
+        /// The generated rooms, once for every encoder.
+        rooms: Rooms,
+    },
+    /// Where queries are found: figures 6.8, 6.9 and 6.13.
+    Matches {
+        /// What is looked at.
+        looked: Looked,
+        /// Near, middle, far.
+        classes: Classes,
+        /// How descriptors are regressed.
+        methods: Vec<Method>,
+    },
+    /// Error against the step of a grid: figure 6.11.
+    Density {
+        /// The scenes.
+        scenes: Vec<Scene>,
+        /// Distances between targets, metres.
+        steps_m: Vec<f64>,
+        /// How descriptors are regressed.
+        method: Method,
+        /// The generated rooms.
+        rooms: Rooms,
+    },
+    /// References of other rooms that look more like the query: figure 6.12.
+    Stray {
+        /// The scenes.
+        scenes: Vec<Scene>,
+        /// How descriptors are regressed.
+        methods: Vec<Method>,
+        /// The generated rooms.
+        rooms: Rooms,
+    },
+    /// Real images along one path, interpolated.
+    Sequences {
+        /// The paths.
+        sequences: Vec<Recorded>,
+        /// Techniques that describe the images.
+        encoders: Vec<String>,
+        /// Every so many-th image of the map stays.
+        every: usize,
+        /// How descriptors are regressed.
+        methods: Vec<Method>,
+    },
 }
 
 impl Study {
@@ -81,8 +149,15 @@ impl Study {
         match self {
             Self::Extrapolation { scenes, rooms, .. }
             | Self::Interpolation { scenes, rooms, .. }
-            | Self::Encoders { scenes, rooms, .. } => Some((scenes, rooms)),
-            Self::Lanes { .. } => None,
+            | Self::Encoders { scenes, rooms, .. }
+            | Self::Viewpoints { scenes, rooms }
+            | Self::Density { scenes, rooms, .. }
+            | Self::Stray { scenes, rooms, .. } => Some((scenes, rooms)),
+            Self::Footprint { scene, rooms, .. } => Some((std::slice::from_ref(scene), rooms)),
+            Self::Matches { looked: Looked::Rooms { scenes, rooms, .. }, .. } => {
+                Some((scenes, rooms))
+            }
+            Self::Lanes { .. } | Self::Matches { .. } | Self::Sequences { .. } => None,
         }
     }
 }
@@ -96,6 +171,8 @@ pub struct Context<'a> {
     pub bare: &'a Sources<'a>,
     /// Seed of every random draw.
     pub seed: u64,
+    /// Whether to measure times, which differ from run to run.
+    pub timings: bool,
 }
 
 impl Context<'_> {
@@ -113,6 +190,7 @@ impl Context<'_> {
 pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Report> {
     let mut table = experiment.table();
     let out = &mut table;
+    let mut figure = None;
     match &experiment.study {
         Study::Extrapolation { scenes, every, step_m, methods, rooms } => {
             let plan = extrapolation::Plan { every: *every, step_m: *step_m, methods, rooms };
@@ -127,9 +205,27 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         Study::Encoders { scenes, step_m, rooms } => {
             encoders::run(out, scenes, *step_m, rooms, context)?;
         }
+        Study::Footprint { scene, step_m, rooms, places, method } => {
+            footprint::run(out, (scene, *step_m, rooms), places, method, context)?;
+        }
+        Study::Viewpoints { scenes, rooms } => {
+            figure = Some(viewpoints::run(out, scenes, rooms, context)?);
+        }
+        Study::Matches { looked, classes, methods } => {
+            figure = Some(matches::run(out, looked, (*classes, methods), context)?);
+        }
+        Study::Density { scenes, steps_m, method, rooms } => {
+            figure = Some(density::run(out, (scenes, steps_m), (method, rooms), context)?);
+        }
+        Study::Stray { scenes, methods, rooms } => {
+            stray::run(out, scenes, (methods, rooms), context)?;
+        }
+        Study::Sequences { sequences, encoders, every, methods } => {
+            sequences::run(out, sequences, (encoders, *every, methods), context)?;
+        }
     }
     experiment.fill_thesis(&mut table);
-    Ok(Report::new(table, None))
+    Ok(Report::new(table, figure))
 }
 
 /// The column of means.

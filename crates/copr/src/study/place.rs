@@ -8,12 +8,17 @@ use serde::Deserialize;
 pub struct Place {
     /// Column in tables.
     pub name: String,
+    /// What the weights of its H are called after.
+    pub key: String,
     /// The generated dataset.
     pub world: String,
     /// What describes its images.
     pub encoder: String,
     /// Where the targets are.
     pub targets: Aside,
+    /// Other generated places of its kind, which its H learns from; it is validated on the last.
+    #[serde(default)]
+    pub learn: Vec<String>,
 }
 
 /// Where targets lie beside a route.

@@ -18,6 +18,11 @@ const MRE: &str = "MRE, °";
 /// Difference of median translation errors.
 const GAIN: &str = "MTE minus that of the sparse map, m";
 
+/// What is left of that if rows are where others should be.
+const OVER_SHUFFLED: &str = "MTE minus that with shuffled rows, m";
+/// Difference of median rotation errors.
+const TURN_GAIN: &str = "MRE minus that of the sparse map, °";
+
 /// Which map was searched: what the rows of a scene are about.
 pub(super) struct Row<'a> {
     /// The map, such as `sparse map`.
@@ -75,6 +80,33 @@ impl Row<'_> {
     ) -> Result<()> {
         let gain = errors.mte_against(sparse, &context.resampling())?;
         self.push(table, GAIN, &gain, errors.len(), PAIRED);
+        Ok(())
+    }
+
+    /// How much less it turns than the sparse map, where targets have orientations of their own.
+    pub(super) fn push_turn_gain(
+        &self,
+        table: &mut Table,
+        errors: &PoseErrors,
+        sparse: &PoseErrors,
+        context: Context<'_>,
+    ) -> Result<()> {
+        let gain = errors.mre_against(sparse, &context.resampling())?;
+        self.push(table, TURN_GAIN, &gain, errors.len(), PAIRED);
+        Ok(())
+    }
+
+    /// How much better than the same rows at each other's poses: what is not owed to there being more
+    /// poses to be found at.
+    pub(super) fn push_gain_over_shuffled(
+        &self,
+        table: &mut Table,
+        errors: &PoseErrors,
+        shuffled: &PoseErrors,
+        context: Context<'_>,
+    ) -> Result<()> {
+        let gain = errors.mte_against(shuffled, &context.resampling())?;
+        self.push(table, OVER_SHUFFLED, &gain, errors.len(), PAIRED);
         Ok(())
     }
 

@@ -1,4 +1,4 @@
-//! `copr train encoder`: the default network under one of the three losses of thesis §6.2.3.
+//! `copr train encoder`: the default network's trunk under one of the three losses of thesis §6.2.3.
 
 use std::path::{Path, PathBuf};
 
@@ -52,7 +52,10 @@ pub(crate) struct EncoderArgs {
         default_value_t = EncoderTraining::new(EncoderLoss::Distance).validated_every
     )]
     validated_every: usize,
-    /// Decides pairs and their changes
+    /// Changed versions of every training image, as in the training of the network
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    variants: usize,
+    /// Decides pairs and changes
     #[arg(long, default_value_t = EncoderTraining::new(EncoderLoss::Distance).seed)]
     seed: u64,
     /// Only say how many images there are
@@ -65,15 +68,19 @@ type Seen = (Vec<PathBuf>, Vec<Pose>);
 
 impl EncoderArgs {
     pub(super) fn run(&self) -> anyhow::Result<Outcome> {
-        let (training, validation, rooms) = self.views()?;
+        let (training, validation, rooms) = self.rooms()?;
         if self.dry_run {
-            let (n, n_validation) = (training.len(), validation.len());
+            let count = |rooms: &[Seen]| rooms.iter().map(|it| it.0.len()).sum::<usize>();
+            let (n, n_validation) = (count(&training), count(&validation));
             cli::print(&format!(
                 "rooms: {}\ntraining images: {n}\nvalidation images: {n_validation}\n",
-                training.n_rooms()
+                training.len()
             ))?;
             return Ok(Outcome::Success);
         }
+        let (network, digest) = default_network()?;
+        let training = Views::open(&training, &network, (self.variants, self.seed))?;
+        let validation = Views::open(&validation, &network, (0, self.seed))?;
         let settings = EncoderTraining {
             loss: self.loss,
             steps: self.steps,
@@ -86,7 +93,6 @@ impl EncoderArgs {
         let output = self.output.clone().unwrap_or(name);
         let folder = Path::new("target").join(format!("copr-encoder-{}", self.loss.name()));
         let folder = self.checkpoints.clone().unwrap_or(folder);
-        let (network, digest) = default_network()?;
         let both = (&training, &validation);
         let facts = settings.facts(both, &digest, &rooms);
         let mut run = Run::open(&folder, &facts, settings.log(&output.with_extension("log.csv")))?;
@@ -97,7 +103,7 @@ impl EncoderArgs {
     }
 
     /// Queries to learn from, references to validate on, and what the rooms are called.
-    fn views(&self) -> anyhow::Result<(Views, Views, String)> {
+    fn rooms(&self) -> anyhow::Result<(Vec<Seen>, Vec<Seen>, String)> {
         let experiment = experiment::load::<Study>(&self.experiment)?;
         let path = self.experiment.display();
         ensure!(experiment.chapter == CHAPTER, "{path}: belongs to `{}`", experiment.chapter);
@@ -108,7 +114,8 @@ impl EncoderArgs {
         let (folders, cache) = (self.data.folders(), self.data.cache());
         let sources = Sources::new(folders.iter().map(PathBuf::as_path), &cache, &bar);
         let bare = Sources::new([], &cache, &bar);
-        let context = Context { sources: &sources, bare: &bare, seed: experiment.seed };
+        let seed = experiment.seed;
+        let context = Context { sources: &sources, bare: &bare, seed, timings: false };
         let (mut training, mut validation): (Vec<Seen>, Vec<Seen>) = (Vec::new(), Vec::new());
         for scene in scenes {
             let dataset = match rooms.images(scene, Paths::Own, context)? {
@@ -121,6 +128,6 @@ impl EncoderArgs {
             validation.push((dataset.references.clone(), references.six_dof()?.to_vec()));
         }
         let names: Vec<String> = scenes.iter().map(|scene| rooms.world(scene)).collect();
-        Ok((Views::open(&training)?, Views::open(&validation)?, names.join(" ")))
+        Ok((training, validation, names.join(" ")))
     }
 }

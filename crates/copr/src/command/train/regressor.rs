@@ -11,7 +11,7 @@ use anyhow::{bail, ensure};
 use copr::{
     net::{Pairs, Training, train},
     sequences,
-    study::{Context, Paths, Study},
+    study::{Context, Paths, Place, Study},
 };
 use vpr_core::{
     Definition, Map, Poses,
@@ -39,6 +39,10 @@ pub(crate) struct RegressorArgs {
     /// for validation, as the thesis has it (C-10)
     #[arg(long, value_name = "FILE", required_unless_present = "training")]
     experiment: Option<PathBuf>,
+    /// The experiment's place whose H it is: it learns from the other places of its kind that the
+    /// experiment names, never from the place itself
+    #[arg(long, requires = "experiment", value_name = "KEY")]
+    place: Option<String>,
     /// Which of the experiment's encoders
     #[arg(long, default_value = "default", value_name = "NAME")]
     encoder: String,
@@ -61,7 +65,7 @@ pub(crate) struct RegressorArgs {
     /// Whether H is told of translations in the axes of the world, as released, or of the anchor
     #[arg(long, value_enum, default_value_t = Relative::Corrected, value_name = "NAME")]
     definition: Relative,
-    /// The weights to write; the log lands beside them [default: data/models/copr-<ENCODER>.safetensors]
+    /// The weights to write; the log lands beside them [default: data/models/copr-<PLACE or ENCODER>.safetensors]
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Folder of checkpoints [default: target/copr-<name of the output>]
@@ -139,7 +143,8 @@ impl RegressorArgs {
             ))?;
             return Ok(Outcome::Success);
         }
-        let name = format!("data/models/copr-{}.safetensors", self.encoder);
+        let called = self.place.as_deref().unwrap_or(&self.encoder);
+        let name = format!("data/models/copr-{called}.safetensors");
         let output = self.output.clone().unwrap_or_else(|| name.into());
         let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let folder = self.checkpoints.clone();
@@ -212,15 +217,26 @@ impl RegressorArgs {
         let experiment = experiment::load::<Study>(path)?;
         let path = path.display();
         ensure!(experiment.chapter == CHAPTER, "{path}: belongs to `{}`", experiment.chapter);
-        let Some((scenes, rooms)) = experiment.study.rooms() else {
-            bail!("{path}: has no generated rooms")
-        };
-        let every = self.every.unwrap_or(rooms.every);
         let bar = Bar::default();
         let (folders, cache) = (self.data.folders(), self.data.cache());
         let sources = Sources::new(folders.iter().map(PathBuf::as_path), &cache, &bar);
         let bare = Sources::new([], &cache, &bar);
-        let context = Context { sources: &sources, bare: &bare, seed: experiment.seed };
+        let seed = experiment.seed;
+        let context = Context { sources: &sources, bare: &bare, seed, timings: false };
+        if let Some(key) = &self.place {
+            let Study::Lanes { places, .. } = &experiment.study else {
+                bail!("{path}: has no places beside which a lane lies")
+            };
+            let Some(place) = places.iter().find(|it| it.key == *key) else {
+                let known: Vec<&str> = places.iter().map(|it| it.key.as_str()).collect();
+                bail!("{path}: no place `{key}`; known: {}", known.join(", "))
+            };
+            return self.of_place(place, context);
+        }
+        let Some((scenes, rooms)) = experiment.study.rooms() else {
+            bail!("{path}: has no generated rooms; `--place` chooses one of its places")
+        };
+        let every = self.every.unwrap_or(rooms.every);
         let (mut training, mut validation) = (Joined::default(), Joined::default());
         for scene in scenes {
             let room = match rooms.open(scene, &self.encoder, Paths::Own, context)? {
@@ -242,6 +258,25 @@ impl RegressorArgs {
         let encoder = self.encoder.clone();
         let (training, validation) = (training.pairs(self, every)?, validation.pairs(self, every)?);
         Ok(Material { training, validation, encoder })
+    }
+}
+
+impl RegressorArgs {
+    /// The other places of a kind, the last of them for validation.
+    fn of_place(&self, place: &Place, context: Context<'_>) -> anyhow::Result<Material> {
+        let lessons = match place.lessons(context)? {
+            Ok(lessons) => lessons,
+            Err(why) => bail!("{why}"),
+        };
+        ensure!(lessons.len() > 1, "`{}` names fewer than two places to learn from", place.key);
+        let (mut training, mut validation) = (Joined::default(), Joined::default());
+        for (number, map) in lessons.iter().enumerate() {
+            let side = if number + 1 == lessons.len() { &mut validation } else { &mut training };
+            side.add(map, slice::from_ref(&(0..map.len())))?;
+        }
+        let every = self.every.unwrap_or(50);
+        let (training, validation) = (training.pairs(self, every)?, validation.pairs(self, every)?);
+        Ok(Material { training, validation, encoder: place.encoder.clone() })
     }
 }
 
