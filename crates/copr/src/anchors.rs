@@ -28,6 +28,8 @@ pub enum Selection {
     Neighbours,
     /// So many, nearest in space first.
     Nearest(usize),
+    /// The same, but where there are fewer, all.
+    UpTo(usize),
     /// So many in a row along the sequence, from the one before its own on, shifted at the ends of
     /// the sequence: what the released code calls the nearest (C-5).
     AlongSequence(usize),
@@ -168,6 +170,7 @@ impl Anchors {
             Selection::Own => (vec![home], 1),
             Selection::Neighbours => ((home..sequence.end.min(home + 2)).collect(), 2),
             Selection::Nearest(n) => (self.nearest(pose.translation.vector.into(), n)?, n),
+            Selection::UpTo(n) => (self.nearest(pose.translation.vector.into(), n)?, 1),
             Selection::AlongSequence(n) => {
                 let last = sequence.end.saturating_sub(n).max(sequence.start);
                 let start = home.saturating_sub(1).clamp(sequence.start, last);
@@ -237,6 +240,7 @@ mod tests {
         assert_eq!(select(window, 6).unwrap(), [6, 7, 8, 9]);
         assert_eq!(select(Selection::Neighbours, 2).unwrap(), [2, 3]);
         assert_eq!(select(Selection::Nearest(3), 6).unwrap(), [6, 5, 7]);
+        assert_eq!(select(Selection::UpTo(13), 6).unwrap().len(), 12);
         let err = select(Selection::Neighbours, 5).unwrap_err().to_string();
         assert_eq!(err, "target 9: a test needs 2 anchors, 1 can be had");
         assert!(matches!(

@@ -9,7 +9,7 @@ use vpr_report::cli;
 
 /// CoPR, chapter 6: descriptors regressed at poses no camera visited.
 #[derive(Parser)]
-#[command(version, about, propagate_version = true)]
+#[command(name = "copr", version, about, propagate_version = true)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

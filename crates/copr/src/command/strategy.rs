@@ -5,8 +5,8 @@ use std::{path::PathBuf, str::FromStr};
 use anyhow::{bail, ensure};
 use clap::ValueEnum;
 use copr::{
-    Anchors, Frame, Grid, LinearInterpolation, Outside, PlaneFit, PlaneParams, Regressor, Targets,
-    net::NetworkRegressor,
+    Anchors, Frame, GaussianParams, GaussianProcess, Grid, LinearInterpolation, Outside, PlaneFit,
+    PlaneParams, Regressor, Targets, net::NetworkRegressor,
 };
 use nalgebra::Vector3;
 use vpr_core::{Definition, Poses};
@@ -71,6 +71,8 @@ enum Strategy {
     Linear,
     /// A plane through the nearest anchors
     Plane,
+    /// A Gaussian process over the poses of up to sixteen anchors
+    Gaussian,
     /// The network H, from the anchor that a target was placed from
     Network,
 }
@@ -175,6 +177,7 @@ impl StrategyArgs {
                 tolerance: self.tolerance,
                 outside: self.outside,
             })?),
+            Strategy::Gaussian => Box::new(GaussianProcess::new(GaussianParams::default())?),
             Strategy::Network => {
                 let Some(path) = &self.weights else {
                     bail!("`--regressor network` needs `--weights`")

@@ -1,6 +1,7 @@
 //! Descriptors at poses that no camera visited, one file per strategy.
 
 mod control;
+mod gaussian;
 mod linear;
 mod plane;
 
@@ -8,6 +9,7 @@ use rayon::prelude::*;
 use vpr_core::Pose;
 
 pub use control::{Control, Controlled};
+pub use gaussian::{GaussianParams, GaussianProcess};
 pub use linear::LinearInterpolation;
 pub use plane::{Outside, PlaneFit, PlaneParams};
 

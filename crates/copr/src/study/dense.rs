@@ -8,8 +8,9 @@ use vpr_core::{Definition, Descriptors, Map, retrieve};
 
 use super::Context;
 use crate::{
-    Control, Controlled, Error, LinearInterpolation, MOST_TARGETS, Options, Outside, PlaneFit,
-    PlaneParams, PoseErrors, Regressor, Result, Targets, Told, net::NetworkRegressor, regressed,
+    Control, Controlled, Error, GaussianParams, GaussianProcess, LinearInterpolation, MOST_TARGETS,
+    Options, Outside, PlaneFit, PlaneParams, PoseErrors, Regressor, Result, Targets, Told,
+    net::NetworkRegressor, regressed,
 };
 
 /// How descriptors are regressed.
@@ -34,6 +35,8 @@ pub enum Method {
         #[serde(default)]
         renormalise: bool,
     },
+    /// A Gaussian process over poses, of many anchors.
+    GaussianProcess {},
     /// What should not help.
     Control {
         /// Which.
@@ -70,6 +73,7 @@ impl Method {
         let name = match self {
             Self::LinearInterpolation => "Lin. Interp.",
             Self::Plane { .. } => "Lin. Reg.",
+            Self::GaussianProcess {} => "Gaussian process",
             Self::Network { renormalise: false, .. } => "Non-lin. Reg.",
             Self::Network { renormalise: true, .. } => "Non-lin. Reg., unit length",
             Self::Control { control: Control::Random, .. } => "random rows",
@@ -118,6 +122,9 @@ impl Method {
                 let params =
                     PlaneParams { definition, tolerance, outside, ..PlaneParams::default() };
                 (Box::new(PlaneFit::new(params)?), Some(name_of(definition)))
+            }
+            Self::GaussianProcess {} => {
+                (Box::new(GaussianProcess::new(GaussianParams::default())?), None)
             }
             Self::Network { weights, renormalise } => {
                 options.renormalise = *renormalise;

@@ -4,7 +4,7 @@ use vpr_core::{Poses, Provenance};
 use vpr_report::table::Table;
 
 use super::{
-    Context, Method, Rooms, Scene,
+    Context, Method, Rooms, Scene, calibration,
     dense::{densified, localize, remark, selected},
     real::RealScene,
     rooms::Room,
@@ -126,6 +126,10 @@ impl OneRoom<'_> {
             let left_out: Vec<usize> =
                 (0..all.len()).filter(|row| !kept.rows().contains(row)).collect();
             let targets = Targets::frames(&closed, poses, &left_out)?;
+            if definition == "corrected" {
+                let what = (self.of, self.scene.name.as_str(), Provenance::Generated);
+                calibration::push(table, what, methods, (all, &left_out, &targets))?;
+            }
             for method in methods {
                 let map = method.map();
                 let ready = match method.ready(context)? {

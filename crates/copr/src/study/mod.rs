@@ -1,5 +1,6 @@
 //! What an experiment file of chapter 6 can ask for, one file per study.
 
+mod calibration;
 mod dense;
 mod density;
 mod encoder;

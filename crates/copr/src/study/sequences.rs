@@ -13,7 +13,7 @@ use vpr_report::table::{Cell, Table};
 use vpr_study::{Runner, technique::Found};
 
 use super::{
-    Context, Method,
+    Context, Method, calibration,
     dense::{densified, localize, remark, selected},
     encoder,
     rows::Row,
@@ -165,6 +165,24 @@ struct Cut<'a> {
 }
 
 impl Cut<'_> {
+    fn label(&self) -> String {
+        match self.block {
+            1 => format!("{}, every second image a query", self.encoder),
+            block => format!("{}, blocks of {block}", self.encoder),
+        }
+    }
+
+    fn row<'a>(
+        &'a self,
+        map: &str,
+        of: &'a str,
+        definition: Option<&'static str>,
+        note: Option<String>,
+    ) -> Row<'a> {
+        let (map, column, provenance) = (map.to_owned(), self.name, Provenance::Measured);
+        Row { map, column, provenance, of, definition, note }
+    }
+
     fn push(
         &self,
         table: &mut Table,
@@ -172,18 +190,8 @@ impl Cut<'_> {
         methods: &[Method],
         context: Context<'_>,
     ) -> Result<()> {
-        let of = match self.block {
-            1 => format!("{}, every second image a query", self.encoder),
-            block => format!("{}, blocks of {block}", self.encoder),
-        };
-        let row = |map: &str, definition, note| Row {
-            map: map.to_owned(),
-            column: self.name,
-            provenance: Provenance::Measured,
-            of: &of,
-            definition,
-            note,
-        };
+        let of = self.label();
+        let row = |map: &str| self.row(map, &of, None, None);
         let n = self.all.len();
         let is_query = |&row: &usize| row / self.block % 2 == 1;
         let (queries, references): (Vec<usize>, Vec<usize>) = (0..n).partition(is_query);
@@ -195,30 +203,46 @@ impl Cut<'_> {
         let poses = map.poses().six_dof()?;
         let best = oracle(queries.poses(), map.poses())?;
         let errors = PoseErrors::of_retrieval(&best, map.poses(), queries.poses())?;
-        row("ground-truth map, oracle", None, None).push_errors(table, &errors, context)?;
+        row("ground-truth map, oracle").push_errors(table, &errors, context)?;
         let errors = localize(&map, &queries)?;
-        row("ground-truth map", None, None).push_errors(table, &errors, context)?;
+        row("ground-truth map").push_errors(table, &errors, context)?;
         let anchors = Anchors::every_and_last(poses, &blocks, every)?;
         let sparse = selected(&map, anchors.rows())?;
-        let sparse_errors = localize(&sparse, &queries)?;
-        row("sparse map", None, None).push_errors(table, &sparse_errors, context)?;
+        let errors = localize(&sparse, &queries)?;
+        row("sparse map").push_errors(table, &errors, context)?;
         let left_out: Vec<usize> =
             (0..map.len()).filter(|it| anchors.rows().binary_search(it).is_err()).collect();
         let targets = Targets::frames(&anchors, poses, &left_out)?;
+        let what = (of.as_str(), self.name, Provenance::Measured);
+        calibration::push(table, what, methods, (&map, &left_out, &targets))?;
+        self.push_methods(table, methods, (&sparse, &map, &queries), &targets, context)
+    }
+
+    /// Every method with its gains over the sparse map.
+    fn push_methods(
+        &self,
+        table: &mut Table,
+        methods: &[Method],
+        (sparse, map, queries): (&Map, &Map, &Map),
+        targets: &Targets<'_>,
+        context: Context<'_>,
+    ) -> Result<()> {
+        let of = self.label();
+        let sparse_errors = localize(sparse, queries)?;
         let (mut network, mut shuffled) = (None, None);
         for method in methods {
             let name = method.map();
             let ready = match method.ready(context)? {
                 Ok(ready) => ready,
                 Err(why) => {
-                    row(&name, None, None).push_absent(table, &why);
+                    self.row(&name, &of, None, None).push_absent(table, &why);
                     continue;
                 }
             };
-            match densified(&sparse, &map, &targets, &ready)? {
+            match densified(sparse, map, targets, &ready)? {
                 Ok((dense, told)) => {
-                    let errors = localize(&dense, &queries)?;
-                    let row = row(&name, ready.definition, remark(told));
+                    let errors = localize(&dense, queries)?;
+                    let row = self.row(&name, &of, ready.definition, remark(told));
                     row.push_errors(table, &errors, context)?;
                     row.push_gain(table, &errors, &sparse_errors, context)?;
                     row.push_turn_gain(table, &errors, &sparse_errors, context)?;
@@ -228,11 +252,13 @@ impl Cut<'_> {
                         shuffled = Some(errors);
                     }
                 }
-                Err(why) => row(&name, ready.definition, None).push_absent(table, &why),
+                Err(why) => {
+                    self.row(&name, &of, ready.definition, None).push_absent(table, &why);
+                }
             }
         }
         if let (Some(network), Some(shuffled)) = (network, shuffled) {
-            let row = row("dense map, Non-lin. Reg.", None, None);
+            let row = self.row("dense map, Non-lin. Reg.", &of, None, None);
             row.push_gain_over_shuffled(table, &network, &shuffled, context)?;
         }
         Ok(())
