@@ -29,8 +29,11 @@ fn run(name: &str, arguments: &[&str]) -> Output {
 fn commands(name: &str) -> Vec<String> {
     let help = String::from_utf8(run(name, &["--help"]).stdout).unwrap();
     let list = help.split("\nCommands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
-    let commands = list.lines().filter_map(|line| line.split_whitespace().next());
-    commands.filter(|it| *it != "help").map(str::to_owned).collect()
+    // What goes on in the next line stands farther to the right.
+    let commands = list.lines().filter_map(|line| line.strip_prefix("  "));
+    let commands = commands.filter(|line| !line.starts_with(' '));
+    let names = commands.filter_map(|line| line.split_whitespace().next());
+    names.filter(|it| *it != "help").map(str::to_owned).collect()
 }
 
 #[test]
@@ -39,6 +42,7 @@ fn shells_can_complete_every_command() {
         for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
             let text = run(name, &["completions", shell]).stdout;
             let text = String::from_utf8(text).unwrap();
+            assert!(!text.contains(&format!("vpr-{name}")), "{name}: the name of the package");
             for command in commands(name) {
                 assert!(text.contains(&command), "{name} {command} in {shell}");
             }

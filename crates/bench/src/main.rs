@@ -9,7 +9,7 @@ use vpr_report::cli;
 
 /// VPR-Bench, chapter 3: techniques, datasets, metrics, invariance and cost of place recognition.
 #[derive(Parser)]
-#[command(version, about, propagate_version = true)]
+#[command(name = "bench", version, about, propagate_version = true)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

@@ -11,7 +11,7 @@ use vpr_report::cli;
 
 /// The small network that every clone has.
 #[derive(Parser)]
-#[command(version, about, propagate_version = true)]
+#[command(name = "default-encoder", version, about, propagate_version = true)]
 struct Args {
     #[command(subcommand)]
     command: Command,

@@ -9,7 +9,7 @@ use vpr_report::cli;
 
 /// RSF, chapter 4: fine-tuning on the references of a map, before any query is seen.
 #[derive(Parser)]
-#[command(version, about, propagate_version = true)]
+#[command(name = "rsf", version, about, propagate_version = true)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

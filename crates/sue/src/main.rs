@@ -9,7 +9,7 @@ use vpr_report::cli;
 
 /// SUE, chapter 5: uncertainty of the best match in visual place recognition.
 #[derive(Parser)]
-#[command(version, about, propagate_version = true)]
+#[command(name = "sue", version, about, propagate_version = true)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

@@ -325,8 +325,10 @@ fn planar_and_spatial_poses_are_told_apart_by_their_files() {
     let lines: Vec<String> = (0..N).map(|i| format!("{i},{i},0,1,1,0,0,0\n")).collect();
     let spatial = "name,x,y,z,qw,qx,qy,qz\n".to_owned() + &lines.concat();
     fs::write(world.path("spatial.csv"), spatial).unwrap();
-    let more = ["--query-poses", "spatial.csv", "--map-poses", "poses.csv"];
-    assert_refused(&world.with("evaluate", &more), &["spatial.csv", "poses.csv"]);
+    npy::write_f32(&world.path("bare.npy"), descriptors(N, 0.0).view()).unwrap();
+    let input = ["evaluate", "--map", "bare.npy", "--queries", "queries.npy", "-k", "3"];
+    let poses = ["--query-poses", "spatial.csv", "--map-poses", "poses.csv"];
+    assert_refused(&world.run(&[input.as_slice(), &poses].concat()), &["spatial.csv", "poses.csv"]);
 }
 
 #[test]
@@ -355,7 +357,7 @@ fn wrong_maps_are_refused_with_what_and_where() {
     );
 
     npy::write_f32(&world.path("bare.npy"), descriptors(N, 0.0).view()).unwrap();
-    assert_refused(&estimate("bare.npy", "queries.npy"), &["needs any kind of poses"]);
+    assert_refused(&estimate("bare.npy", "queries.npy"), &["`sue` needs positions", "--map-poses"]);
     fs::write(world.path("nan.csv"), pose_csv(&positions(N, 0.0)).replace("80,", "NaN,")).unwrap();
     let arguments = [
         "estimate",

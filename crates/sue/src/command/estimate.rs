@@ -71,6 +71,9 @@ pub(crate) fn run(args: &EstimateArgs) -> anyhow::Result<Outcome> {
     ensure!(!is_npy || args.out.is_some(), "`--format npy` needs `--out`: it is no text");
     args.out.iter().try_for_each(|path| cli::check_out(path))?;
     let input = args.input.open(&[args.estimator])?;
+    if args.variances.is_none() {
+        input.check_poses(&[args.estimator])?;
+    }
     // A threshold of an estimator says nothing about variances.
     let origin = args.variances.is_none().then(|| Origin::new(args.estimator, &input));
     let threshold = args.threshold.as_ref().map(|it| it.open(origin.as_ref())).transpose()?;

@@ -46,6 +46,7 @@ const DIFFERENCE: &str = "paired bootstrap over queries";
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     args.report.path.iter().try_for_each(|path| cli::check_out(path))?;
     let input = args.input.open(&args.estimator)?;
+    input.check_poses(&args.estimator)?;
     let truth = args.truth.truth(&input)?;
     let retrieval = input.retrieve()?;
     let judged = Judged::new(&retrieval.best(), &truth)?;

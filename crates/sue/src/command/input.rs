@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use sue::{DistanceKind, EstimatorChoice, EstimatorSettings, Sue, SueParams};
+use sue::{DistanceKind, EstimatorChoice, EstimatorSettings, Share, Sue, SueParams};
 use vpr_core::{
     Descriptors, Error, Poses, Retrieval,
     knn::{self, Metric, SearchParams},
@@ -17,6 +17,7 @@ use super::{
     normalization::{Measured, NormalizationArgs, Scale, unit_distance},
     scores::{Scores, ScoresArgs},
     side::{Rows, Side, check, joined},
+    threshold,
 };
 
 /// Map and queries, and what the estimators are told.
@@ -192,6 +193,19 @@ impl InputArgs {
 }
 
 impl Input {
+    /// Refuses estimators that look at positions where the references have none.
+    pub(crate) fn check_poses(&self, estimators: &[EstimatorChoice]) -> anyhow::Result<()> {
+        let is_spatial = |it: &&EstimatorChoice| it.needs().poses != Share::None;
+        match estimators.iter().find(is_spatial) {
+            Some(&estimator) if self.poses.is_none() => anyhow::bail!(
+                "`{}` needs positions of the references: give --map-poses, or an --estimator without \
+                 positions, such as l2",
+                threshold::name(estimator)
+            ),
+            _ => Ok(()),
+        }
+    }
+
     /// Poses of the queries: those of a file, or else those that came with their descriptors;
     /// checked against those of the references, so that distances mean something.
     pub(crate) fn query_poses(&self, file: Option<&Path>) -> anyhow::Result<Option<Poses>> {

@@ -94,7 +94,7 @@ impl ThresholdArg {
 }
 
 /// The name on the command line.
-fn name(estimator: EstimatorChoice) -> String {
+pub(super) fn name(estimator: EstimatorChoice) -> String {
     let value = clap::ValueEnum::to_possible_value(&estimator);
     value.map(|it| it.get_name().to_owned()).unwrap_or_default()
 }
