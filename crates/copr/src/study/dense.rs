@@ -86,10 +86,13 @@ impl Method {
         format!("dense map, {name}")
     }
 
-    /// The same with the weights of a place, where their name says `{place}`.
-    pub(super) fn at(&self, place: &str) -> Self {
-        let of =
-            |weights: &PathBuf| PathBuf::from(weights.to_string_lossy().replace("{place}", place));
+    /// The same with the weights of a place or an encoder, where their name says `{place}` or
+    /// `{encoder}`.
+    pub(super) fn at(&self, name: &str) -> Self {
+        let of = |weights: &PathBuf| {
+            let weights = weights.to_string_lossy();
+            PathBuf::from(weights.replace("{place}", name).replace("{encoder}", name))
+        };
         match self {
             Self::Network { weights, renormalise } => {
                 Self::Network { weights: of(weights), renormalise: *renormalise }

@@ -57,7 +57,7 @@ fn of_scene(
             return Ok(None);
         }
     };
-    let ready = match method.ready(context)? {
+    let ready = match method.at(encoder).ready(context)? {
         Ok(ready) => ready,
         Err(why) => {
             table.push(Cell::absent(&row, "sparse map", why));

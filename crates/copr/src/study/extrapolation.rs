@@ -81,6 +81,7 @@ fn dense_poses(sequence: &[Pose], every: usize, grid: &Grid) -> Result<Poses> {
 
 fn in_rooms(table: &mut Table, scene: &Scene, plan: Plan<'_>, context: Context<'_>) -> Result<()> {
     for encoder in &plan.rooms.encoders {
+        let methods: Vec<Method> = plan.methods.iter().map(|it| it.at(encoder)).collect();
         for &paths in &plan.rooms.paths {
             let of = Rooms::label(encoder, paths);
             let row = |map: &str, definition, note| Row {
@@ -107,12 +108,7 @@ fn in_rooms(table: &mut Table, scene: &Scene, plan: Plan<'_>, context: Context<'
             let grid = Grid::new(scene.span_m, plan.step_m, Definition::Corrected)?;
             let targets = Targets::around(&anchors, &grid)?;
             let (queries, targets) = (&room.queries.map, &targets);
-            Setting { sparse: &sparse, queries, targets }.push(
-                table,
-                plan.methods,
-                row,
-                context,
-            )?;
+            Setting { sparse: &sparse, queries, targets }.push(table, &methods, row, context)?;
         }
     }
     Ok(())

@@ -27,12 +27,13 @@ pub(super) fn run(
     }
     for scene in scenes {
         for encoder in &rooms.encoders {
+            let methods: Vec<Method> = methods.iter().map(|it| it.at(encoder)).collect();
             for &paths in &rooms.paths {
                 let of = Rooms::label(encoder, paths);
                 match rooms.open(scene, encoder, paths, context)? {
                     Ok(room) => {
                         let one = OneRoom { scene, of: &of, room: &room, every: rooms.every };
-                        one.run(table, methods, context)?;
+                        one.run(table, &methods, context)?;
                     }
                     Err(why) => {
                         let one = Row {

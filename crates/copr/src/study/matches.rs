@@ -93,7 +93,8 @@ fn in_room(
     let grid = Grid::new(scene.span_m, step_m, Definition::Corrected)?;
     let targets = Targets::around(&anchors, &grid)?;
     let shown = Shown { label, queries: &room.queries.map, classes };
-    shown.all((table, figure), (&sparse, &targets), methods, context)
+    let methods: Vec<Method> = methods.iter().map(|it| it.at(encoder)).collect();
+    shown.all((table, figure), (&sparse, &targets), &methods, context)
 }
 
 fn beside(

@@ -232,7 +232,7 @@ impl Cut<'_> {
         let (mut network, mut shuffled) = (None, None);
         for method in methods {
             let name = method.map();
-            let ready = match method.ready(context)? {
+            let ready = match method.at(self.encoder).ready(context)? {
                 Ok(ready) => ready,
                 Err(why) => {
                     self.row(&name, &of, None, None).push_absent(table, &why);

@@ -8,8 +8,8 @@ use vpr_core::{
 };
 use vpr_report::table::{Cell, Table};
 
-use super::{Context, Method, Paths, Rooms, Scene, rooms::Room};
-use crate::{Anchors, Regressor, Result, Targets, regressed};
+use super::{Context, Method, Paths, Rooms, Scene, dense::Ready, rooms::Room};
+use crate::{Anchors, Result, Targets, regressed};
 
 /// References of its own room that a query is given, as in the thesis.
 const OWN: usize = 4;
@@ -70,9 +70,9 @@ fn of_encoder(
         push(table, "strayed: sparse map", &before)?;
         for method in methods {
             let name = method.map();
-            match method.ready(context)? {
+            match method.at(encoder).ready(context)? {
                 Ok(ready) => {
-                    let after = one.strayed(Some(&*ready.regressor))?;
+                    let after = one.strayed(Some(&ready))?;
                     let both = || before.iter().zip(&after);
                     push(table, &format!("strayed: {name}"), &after)?;
                     let mended: Vec<bool> = both().map(|(was, is)| *was && !is).collect();
@@ -99,16 +99,16 @@ impl One<'_> {
     /// For each query, whether some reference of another room looks more like it than the four
     /// sparsely sampled ones of its own that are nearest in space, and than what is regressed from the
     /// nearest of them at the query's pose.
-    fn strayed(&self, regressor: Option<&dyn Regressor>) -> Result<Vec<bool>> {
+    fn strayed(&self, ready: Option<&Ready>) -> Result<Vec<bool>> {
         let (queries, own) = (&self.room.queries.map, &self.room.references.map);
         let poses = own.poses().six_dof()?;
         let anchors = Anchors::every(poses, &self.room.references.sequences, self.every)?;
         let at: &[Pose] = queries.poses().six_dof()?;
-        let expected = match regressor {
+        let expected = match ready {
             None => None,
-            Some(regressor) => {
+            Some(ready) => {
                 let targets = Targets::listed(&anchors, at)?;
-                Some(regressed(own, &targets, regressor, crate::Options::default())?.0)
+                Some(regressed(own, &targets, &*ready.regressor, ready.options)?.0)
             }
         };
         let positions = Poses::SixDof(at.to_vec());
