@@ -49,7 +49,7 @@ pub fn html(folder: &Path) -> Result<String> {
             .into_iter()
             .find(|it| folder.join(format!("{}.{it}", entry.id)).is_file())
             .map(|it| {
-                format!("<a href=\"{page}\"><img src=\"{id}.{it}\" alt=\"{id} as a picture\" width=\"240\"></a>")
+                format!("<a href=\"{page}\"><img src=\"{id}.{it}\" alt=\"{id} as a picture\" loading=\"lazy\"></a>")
             });
         format!(
             "<tr><td><a href=\"{page}\">{id}</a></td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",

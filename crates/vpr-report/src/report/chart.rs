@@ -90,9 +90,13 @@ impl Chart<'_> {
         writeln!(out, "<path class=\"axis\" d=\"M{left} {top}V{bottom}H{}\"/>", left + plot_width)?;
         for step in 0..=4 {
             let share = f64::from(step) / 4.0;
-            let x = self.x.0 + share * (self.x.1 - self.x.0);
+            let mut x = self.x.0 + share * (self.x.1 - self.x.0);
+            // Ranks are whole numbers.
+            if self.x.1 - self.x.0 >= 4.0 {
+                x = x.round();
+            }
             let y = self.y.0 + share * (self.y.1 - self.y.0);
-            let (at_x, at_y) = (left + share * plot_width, bottom - share * plot_height);
+            let (at_x, at_y) = (self.place((x, self.y.0)).0, bottom - share * plot_height);
             writeln!(
                 out,
                 "<path class=\"grid\" d=\"M{left} {at_y:.1}h{plot_width}\"/>\

@@ -6,8 +6,10 @@ use vpr_core::Poses;
 
 use super::{Dataset, Judged, Report, escape, summary::title};
 
-/// Width of a view and the margin around its points; the script knows the margin too.
-const WIDTH: f64 = 640.0;
+/// Longest side of a view and the margin around its points; the script knows the margin too.
+const SIDE: f64 = 640.0;
+/// Shortest side of a view.
+const SHORT: f64 = 120.0;
 const MARGIN: f64 = 10.0;
 
 /// Positions seen along one axis.
@@ -20,6 +22,7 @@ pub(super) struct View {
     pub(super) origin: (f64, f64),
     /// Pixels per metre.
     pub(super) scale: f64,
+    width: f64,
     pub(super) height: f64,
 }
 
@@ -38,11 +41,11 @@ pub(super) fn views(dataset: &Dataset<'_>) -> Vec<View> {
         return Vec::new();
     }
     let view = |title, axes, a: (f64, f64), b: (f64, f64)| {
-        let inner = WIDTH - 2.0 * MARGIN;
+        let inner = SIDE - 2.0 * MARGIN;
         let (wide, high) = ((a.1 - a.0).max(1e-6), (b.1 - b.0).max(1e-6));
         let scale = (inner / wide).min(inner / high);
-        let height = (high * scale + 2.0 * MARGIN).max(120.0);
-        View { title, axes, origin: (a.0, b.0), scale, height }
+        let [width, height] = [wide, high].map(|it| (it * scale + 2.0 * MARGIN).max(SHORT));
+        View { title, axes, origin: (a.0, b.0), scale, width, height }
     };
     let mut views = vec![view("from above", (0, 1), x, y)];
     let is_planar = matches!(queries, Poses::Planar(_)) && matches!(references, Poses::Planar(_));
@@ -82,12 +85,13 @@ pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged])
         let run = report.runs.iter().position(|run| run.dataset == index);
         for (nth, view) in views(dataset).iter().enumerate() {
             let (Some((queries, references)), Some(run)) = (dataset.poses, run) else { continue };
-            let height = view.height;
+            // As large as the widest view on the same screen.
+            let (across, height, most) = (view.width, view.height, 900.0 * view.width / SIDE);
             let about = format!("{} {}", dataset.name, view.title);
             writeln!(
                 out,
                 "<figure class=\"map\" data-dataset=\"{index}\" data-view=\"{nth}\"><figcaption>{}, <span class=\"who\">{}</span></figcaption>\n\
-                 <svg viewBox=\"0 0 {WIDTH} {height:.1}\" role=\"img\" aria-label=\"Map of {}: {}\">",
+                 <svg viewBox=\"0 0 {across:.1} {height:.1}\" style=\"max-width:{most:.0}px\" role=\"img\" aria-label=\"Map of {}: {}\">",
                 escape(&about),
                 escape(&title(report, &report.runs[run])),
                 escape(&about),

@@ -91,10 +91,12 @@ pub fn html_document(title: &str, body: &str) -> String {
 }
 
 const STYLE: &str = ":root{color-scheme:light dark}\
-    body{font:16px/1.5 system-ui,sans-serif;margin:1rem}main{max-width:75rem;margin:auto}\
+    body{font:16px/1.5 system-ui,sans-serif;margin:1rem;background:#fff;color:#1d2127}a{color:#005a9c}\
+    @media (prefers-color-scheme:dark){body{background:#14171c;color:#e8eaed}a{color:#8ec7ff}}\
+    @media print{body{background:#fff;color:#000}}main{max-width:75rem;margin:auto}\
     .wide{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}\
     th,td{text-align:left;padding:.2rem .7rem;border-bottom:1px solid #8886;vertical-align:top}\
-    img{max-width:100%;background:#fff}";
+    img{max-width:100%;background:#fff}td a{white-space:nowrap}td img{max-height:9rem;width:auto}";
 
 /// The cells of a page's CSV, timings left out.
 #[must_use]

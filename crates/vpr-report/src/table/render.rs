@@ -81,7 +81,9 @@ fn html(block: &Block) -> String {
     if let Some(row) = &block.heading {
         let _ = writeln!(text, "<caption>{}</caption>", escape(row));
     }
-    let header = cells("th", &block.header).replace("<th>", "<th scope=\"col\">");
+    // A corner that says nothing heads nothing.
+    let header = cells("th", &block.header).replace("<th></th>", "<td></td>");
+    let header = header.replace("<th>", "<th scope=\"col\">");
     let _ = writeln!(text, "<thead><tr>{header}</tr></thead>\n<tbody>");
     for line in &block.lines {
         let _ = writeln!(text, "<tr>{}</tr>", cells("td", line));

@@ -77,6 +77,23 @@ fn drawn(svg: &str, classes: &[char]) -> Vec<Bounds> {
     elements.filter(|it| !attribute(it, "d").unwrap().is_empty()).map(of).collect()
 }
 
+/// The thin lines that lead to names, which run aslant, in short pieces.
+fn leaders(svg: &str) -> Vec<Bounds> {
+    let elements = svg.lines().filter(|line| line.starts_with("<path class=\"h"));
+    let pieces = |line: &str| {
+        let data = attribute(line, "d").unwrap().replace(['M', 'L'], " ");
+        let ends: Vec<f64> = data.split_whitespace().map(|it| it.parse().unwrap()).collect();
+        let at = |share: f64| [0, 1].map(|it| ends[it] + share * (ends[it + 2] - ends[it]));
+        let piece = |index: u32| {
+            let [from, to] = [index, index + 1].map(|it| at(f64::from(it) / 16.0));
+            let side = |it: usize| [from[it].min(to[it]), from[it].max(to[it])];
+            Bounds { what: "a line to a name".into(), x: side(0), y: side(1) }
+        };
+        (0..16).map(piece).collect::<Vec<_>>()
+    };
+    elements.flat_map(pieces).collect()
+}
+
 /// The plots of a document, by their axes.
 fn plots(svg: &str) -> Vec<Bounds> {
     let axes = svg.lines().filter(|line| line.starts_with("<path class=\"a\""));
@@ -117,7 +134,8 @@ pub(super) fn faults(svg: &str) -> Vec<String> {
     let picture =
         Bounds { what: "the picture".into(), x: [0.0, side("width")], y: [0.0, side("height")] };
     let texts = texts(svg);
-    let curves = drawn(svg, &['l', 'p', 'b', 'o', 'h', 'm', 'x', 'w']);
+    let mut curves = drawn(svg, &['l', 'p', 'b', 'o', 'm', 'x', 'w']);
+    curves.extend(leaders(svg));
     for (index, text) in texts.iter().enumerate() {
         if !text.is_within(&picture) {
             faults.push(format!("{} is outside of the picture", text.what));
