@@ -72,7 +72,8 @@ fn one(
     };
     let queries = &room.queries.map;
     let sparse = selected(&room.references.map, &room.kept.clone().collect::<Vec<_>>())?;
-    push("sparse map", &localize(&sparse, queries)?)?;
+    let sparse_errors = localize(&sparse, queries)?;
+    push("sparse map", &sparse_errors)?;
     let anchors =
         Anchors::every(sparse.poses().six_dof()?, &sequences(None, sparse.len()), rooms.every)?;
     let grid = Grid::new(scene.span_m, step_m, Definition::Corrected)?;
@@ -82,7 +83,14 @@ fn one(
         Err(why) => Err(why),
     };
     match dense {
-        Ok((dense, _)) => push("dense map", &localize(&dense, queries)?)?,
+        Ok((dense, _)) => {
+            let errors = localize(&dense, queries)?;
+            push("dense map", &errors)?;
+            let gain = errors.mte_against(&sparse_errors, &context.resampling())?;
+            let (name, provenance) = (column("dense minus sparse"), Provenance::Generated);
+            let cell = Cell::new(&row, name, gain.estimate, provenance, errors.len());
+            table.push(cell.within(gain.low, gain.high, "paired bootstrap over queries"));
+        }
         Err(why) => table.push(Cell::absent(&row, column("dense map"), why)),
     }
     Ok(())
