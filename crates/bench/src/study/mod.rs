@@ -35,7 +35,7 @@ use vpr_report::{
 pub use invariance::Stage;
 pub use platform_speed::TechniqueTiming;
 pub use sheets::Scene;
-use vpr_study::Sources;
+use vpr_study::{Runner, Sources, technique::hand_crafted_names};
 pub use worlds::{Domain, Likeness, Worlds};
 
 /// What to compute; the key `kind` of `[study]` chooses.
@@ -197,6 +197,12 @@ impl Context<'_> {
     fn images(&self, id: &str) -> Result<Option<Arc<Dataset>>> {
         self.sources.images(id)
     }
+}
+
+/// Whether every clone has the technique: where other rows depend on who takes part, generated places
+/// are left to these, so that their rows are the same with data and without.
+fn in_every_clone(runner: &Runner) -> bool {
+    runner.name == "default" || hand_crafted_names().any(|name| name == runner.name)
 }
 
 /// The panel with this title, added if there is none yet.

@@ -49,7 +49,7 @@ pub(super) fn run(
         let sources = context.sources;
         let Some(dataset) = sources.images(id)? else {
             let why = sources.why_absent(id, "images")?;
-            table.push(Cell::absent(&sources.entry(id)?.name, "pairs within", why));
+            table.push(Cell::absent(&sources.entry(id)?.name, "within", why));
             continue;
         };
         let world = World::open(&named_recipe(id)?, sources.cache(), &|| {})?;
@@ -81,16 +81,8 @@ pub(super) fn run(
                 ));
                 Ok(())
             };
-            push(
-                ["pairs within", "of these, share below 10 %"],
-                counts.within,
-                counts.within_apart,
-            )?;
-            push(
-                ["pairs that share above 50 %", "of these, beyond"],
-                counts.same,
-                counts.same_beyond,
-            )?;
+            push(["within", "of these < 10 % shared"], counts.within, counts.within_apart)?;
+            push(["> 50 % shared", "of these beyond"], counts.same, counts.same_beyond)?;
         }
     }
     Ok(())

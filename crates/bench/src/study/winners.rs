@@ -1,19 +1,31 @@
 //! Which technique is best on each dataset, and whom it cannot be told from.
 
 use vpr_core::{
-    Result,
+    Provenance, Result,
     metrics::{McNemar, bootstrap::Resampling},
 };
 use vpr_report::table::{Cell, Table, Value};
-use vpr_study::Subject;
+use vpr_study::{Runner, Subject};
 
-use super::Context;
+use super::{Context, in_every_clone};
 use crate::comparison::{Comparison, Found, Metric, Protocol};
 
 const METRICS: [(Metric, &str); 2] = [(Metric::RecallAt(1), "R@1"), (Metric::AucPr, "AUC-PR")];
 
 pub(super) fn run(table: &mut Table, datasets: &[String], context: Context<'_>) -> Result<()> {
-    let subjects = context.sources.subjects(table, datasets)?;
+    let mut absent = Table::new("winners", "datasets that are not at hand");
+    let subjects = context.sources.subjects(&mut absent, datasets)?;
+    // Once for a dataset, not for each of its techniques.
+    for cells in absent.cells.chunk_by(|a, b| a.row == b.row) {
+        let why = cells[0].note.as_deref().unwrap_or_default();
+        table.push(Cell::absent(&cells[0].row, "best, R@1", why));
+    }
+    let runners = context.sources.runners()?;
+    let takes_part = |it: &Subject| {
+        let is = |runner: &Runner| runner.column == it.column && in_every_clone(runner);
+        it.provenance != Provenance::Generated || runners.iter().any(is)
+    };
+    let subjects: Vec<Subject> = subjects.into_iter().filter(takes_part).collect();
     for group in subjects.chunk_by(|a, b| a.row == b.row && a.provenance == b.provenance) {
         if group.len() > 1 {
             rank(table, group, context.seed)?;

@@ -7,9 +7,9 @@ use vpr_core::{
 };
 use vpr_data::Dataset;
 use vpr_report::table::{Cell, Table};
-use vpr_study::{ContactSheet, Direction, Tile};
+use vpr_study::{ContactSheet, Direction, Runner, Tile};
 
-use super::{Context, may_be_shown, opened};
+use super::{super::in_every_clone, Context, may_be_shown, opened};
 
 pub(super) fn run(
     table: &mut Table,
@@ -17,7 +17,8 @@ pub(super) fn run(
     datasets: &[String],
     context: Context<'_>,
 ) -> Result<()> {
-    let runners = context.sources.runners()?;
+    let runners: Vec<&Runner> =
+        context.sources.runners()?.iter().filter(|it| in_every_clone(it)).collect();
     let mut columns = Vec::new();
     for id in datasets {
         let Some(dataset) = opened(table, id, "at least one technique", context)? else { continue };
@@ -25,7 +26,7 @@ pub(super) fn run(
         let remark = dataset.name.trim_end_matches(" (generated)").to_owned();
         let mut column = vec![Tile::query(&dataset.queries, query, remark)];
         let mut all = Vec::new();
-        for runner in runners {
+        for &runner in &runners {
             let scores = context.sources.scores(runner, &dataset, Direction::AsReleased)?;
             let best = &scores.best().reference;
             let right = dataset.truth.judge(best)?;
