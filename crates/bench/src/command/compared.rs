@@ -58,10 +58,10 @@ impl Compared<'_> {
             None => "no number of queries found".to_owned(),
         };
         format!(
-            "{}: {size}{counts}, p = {:.3}, corrected {:.3}; power {:.2}, {needed} for {}",
+            "{}: {size}{counts}, p {}, corrected {}; power {:.2}, {needed} for {}",
             self.row(pair),
-            pair.p_value,
-            pair.corrected,
+            p_value(pair.p_value),
+            p_value(pair.corrected),
             pair.power,
             self.protocol.power
         )
@@ -179,6 +179,11 @@ impl Compared<'_> {
     fn row(&self, pair: &Pair) -> String {
         format!("{} − {}, {}", self.names[pair.first], self.names[pair.second], name(pair.metric))
     }
+}
+
+/// No p-value is zero.
+fn p_value(value: f64) -> String {
+    if value < 0.001 { "< 0.001".to_owned() } else { format!("= {value:.3}") }
 }
 
 fn name(metric: Metric) -> String {
