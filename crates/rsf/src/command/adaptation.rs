@@ -59,12 +59,17 @@ impl Adaptation<'_> {
         let log = run_log(&self.output.with_extension("log.csv"));
         let mut run = Run::open(folder, &facts, log)?;
         let tuned = finetune(settings, network, (self.set, &material), &mut run, folder, show)?;
-        facts.push(("best", format!("step {}, {}", tuned.best_step, told(tuned.best))));
+        facts.push(("best", format!("{}, {}", place(&tuned), told(tuned.best))));
         save(&tuned.network, self.output, &facts, self.precision)?;
         cli::note(&verdict(&tuned));
         cli::note(&format!("{}: {}", self.name, self.output.display()));
         Ok(())
     }
+}
+
+/// Which network it was.
+fn place(tuned: &Outcome) -> String {
+    format!("step {}, {} of the way", tuned.best_step, tuned.share)
 }
 
 fn told(score: Score) -> String {
@@ -78,7 +83,7 @@ fn verdict(tuned: &Outcome) -> String {
         return "no round was better on held-out references: the weights are those it began with"
             .to_owned();
     }
-    format!("before: {}\nstep {best_step}: {}", told(*before), told(*best))
+    format!("before: {}\n{}: {}", told(*before), place(tuned), told(*best))
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "what fine-tuning calls")]

@@ -13,13 +13,18 @@ use vpr_nets::{
     weights::{self, Precision, Weights},
 };
 
-use super::{Lessons, Material, Score, Student, Trial};
+use super::{
+    Lessons, Material, Score, Student, Trial,
+    mixture::{SHARES, mixed},
+};
 use crate::{Augmentations, Mined, MiningParams, Preset, ReferenceSet, Result, Split};
 
 /// Steps between two lines of the log.
 const LOG_EVERY: usize = 5;
 /// What the best network so far is called; step and score follow.
 const BEST: &str = "best-";
+/// The network that it began with.
+const START: &str = "start.safetensors";
 
 /// How to fine-tune. Of these the thesis gives the learning rate alone, 1e-7 for its `DINOv2` models;
 /// the default network, of 0.65 M parameters, needs a larger one. Steps, batch and rate of the default
@@ -84,6 +89,8 @@ pub struct Outcome {
     pub network: DefaultEncoder,
     /// Steps after which it was best; 0 for the network that it began with.
     pub best_step: usize,
+    /// Share of the way from the network that it began with to the one of these steps.
+    pub share: f32,
     /// What that network makes of the held-out references.
     pub best: Score,
     /// What the network that it began with makes of them.
@@ -179,8 +186,10 @@ impl Finetuning {
 ///
 /// A round mines triplets with the network as it is, takes [`Finetuning::round`] steps, and looks
 /// held-out references up under augmentations that training does not draw. The best network is kept
-/// in `folder`; after [`Finetuning::patience`] rounds without a gain it ends. `run` must be open in
-/// `folder`, with [`run_log`]; `observe` is told of every round, after 0 steps too.
+/// in `folder`; after [`Finetuning::patience`] rounds without a gain it ends. Then the held-out
+/// references say how much of the way to the best network is gone: a quarter, half, three quarters or
+/// all of it, since less than all keeps more of what was known. `run` must be open in `folder`, with
+/// [`run_log`]; `observe` is told of every round, after 0 steps too.
 ///
 /// # Errors
 ///
@@ -210,6 +219,7 @@ pub fn finetune(
     let before = judge(&network)?;
     observe(0, f64::NAN, before)?;
     keep_if_best(folder, 0, before, &network)?;
+    weights::save(&network, &folder.join(START), &[], Precision::Single)?;
     let mut student = Student::new(network, settings.margin, &settings.frozen)?;
     let done = Checkpoint::new(folder).latest()?.unwrap_or(0) / settings.round;
     for round in done..=settings.steps / settings.round {
@@ -242,12 +252,37 @@ pub fn finetune(
             },
         )?;
     }
+    chosen(folder, before, judge)
+}
+
+/// The best network in a folder, or one on the way to it.
+fn chosen(
+    folder: &Path,
+    before: Score,
+    judge: impl Fn(&DefaultEncoder) -> Result<Score>,
+) -> Result<Outcome> {
     let (best_step, best, path) =
         best(folder)?.ok_or_else(|| CoreError::format(folder, "best network", "is not there"))?;
-    let mut network = DefaultEncoderConfig::new().init(&device());
-    Weights::open(&path)?.apply(&mut network)?;
+    let [start, end] = [Weights::open(&folder.join(START))?, Weights::open(&path)?];
     let best = Score { n: before.n, ..best };
-    Ok(Outcome { network, best_step, best, before })
+    let whole = Outcome { network: mixed(&start, &end, 1.0)?, best_step, share: 1.0, best, before };
+    if best_step == 0 {
+        return Ok(whole);
+    }
+    SHARES.iter().rev().try_fold(whole, |outcome, &share| {
+        let network = mixed(&start, &end, share)?;
+        let best = judge(&network)?;
+        Ok(if is_better(&best, &outcome.best) {
+            Outcome { network, share, best, ..outcome }
+        } else {
+            outcome
+        })
+    })
+}
+
+/// By recall, then by gap.
+fn is_better(new: &Score, old: &Score) -> bool {
+    (new.recall, new.gap) > (old.recall, old.gap)
 }
 
 /// The network after the last step that was saved in a folder, whether it was best or not.
@@ -302,8 +337,7 @@ fn core(err: crate::Error) -> CoreError {
 /// its last checkpoint is reached again, with the same score.
 fn keep_if_best(folder: &Path, step: usize, score: Score, network: &DefaultEncoder) -> Result<()> {
     let before = best(folder)?;
-    let is_better = |old: &Score| (score.recall, score.gap) > (old.recall, old.gap);
-    if before.as_ref().is_some_and(|(_, old, _)| !is_better(old)) {
+    if before.as_ref().is_some_and(|(_, old, _)| !is_better(&score, old)) {
         return Ok(());
     }
     let (recall, gap) = (score.recall.to_bits(), score.gap.to_bits());

@@ -3,6 +3,7 @@
 mod finetune;
 mod lessons;
 mod material;
+mod mixture;
 mod parts;
 mod student;
 #[cfg(test)]

@@ -163,6 +163,29 @@ fn steps_pull_a_trial_apart() {
 }
 
 #[test]
+fn between_two_networks_lie_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let (start, _) = default_network(None).unwrap();
+    let material = Material::open(&map(folder.path(), 5, false)).unwrap();
+    let end = whiten(&Whitening::default(), start.clone(), &material).unwrap();
+    let saved = |network: &DefaultEncoder| {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        save(network, file.path(), &[], Precision::Single).unwrap();
+        Weights::open(file.path()).unwrap()
+    };
+    let (a, b) = (saved(&start), saved(&end));
+    assert_eq!(weights(&mixture::mixed(&a, &b, 0.0).unwrap()), weights(&start));
+    let half = weights(&mixture::mixed(&a, &b, 0.5).unwrap());
+    assert_eq!(moved(&weights(&start), &half), ["head.bias", "head.weight"]);
+    let values = |weights: &[(String, Vec<f32>)]| -> Vec<f32> {
+        weights.iter().find(|it| it.0 == "head.bias").unwrap().1.clone()
+    };
+    let (a, b, half) = (values(&weights(&start)), values(&weights(&end)), values(&half));
+    let is_middle = |at: usize| (f32::midpoint(a[at], b[at]) - half[at]).abs() < 1e-6;
+    assert!((0..half.len()).all(is_middle));
+}
+
+#[test]
 fn a_small_map_is_whitened_with_as_many_directions_as_it_has() {
     let folder = tempfile::tempdir().unwrap();
     let set = map(folder.path(), 5, false);
