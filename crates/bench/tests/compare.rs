@@ -59,7 +59,10 @@ fn a_difference_is_tested_counted_and_planned() {
     let text = success(&bench(folder.path(), &flags));
     assert!(text.starts_with("A: R@1: 91.7, AUC-PR:"), "{text}");
     // 25 queries that only A gets right, none that only B does: mid-p is 2⁻²⁵.
-    assert!(text.contains("A − B, R@1: +41.7 (25 wins, 0 losses), p < 0.001, corrected < 0.001"), "{text}");
+    assert!(
+        text.contains("A − B, R@1: +41.7 (25 wins, 0 losses), p < 0.001, corrected < 0.001"),
+        "{text}"
+    );
     assert!(text.contains("R@1: A is best and differs from all others"), "{text}");
 
     let json = success(&bench(folder.path(), &[&flags[..], &["--format", "json"]].concat()));
