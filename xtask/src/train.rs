@@ -41,6 +41,22 @@ enum Network {
     RsfEynsham,
 }
 
+/// `copr train regressor` as the committed weights were made.
+const COPR: [&str; 12] = [
+    "train",
+    "regressor",
+    "--experiment",
+    "experiments/table-6.1.toml",
+    "--near",
+    "0.8,45",
+    "--at-most",
+    "40000",
+    "--steps",
+    "13000",
+    "--halved-every",
+    "4000",
+];
+
 /// `rsf train` with the experiments that say how; the place follows.
 const RSF: [&str; 6] = [
     "train",
@@ -58,9 +74,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Network::DefaultEncoder => ("default-encoder", vec!["train"]),
         Network::Btl => ("sue", vec!["train", "btl"]),
         Network::Stun => ("sue", vec!["train", "stun"]),
-        Network::CoprRegressor => {
-            ("copr", vec!["train", "regressor", "--experiment", "experiments/table-6.1.toml"])
-        }
+        Network::CoprRegressor => ("copr", COPR.to_vec()),
         Network::RsfRail => rsf("rail"),
         Network::RsfArchive => rsf("archive"),
         Network::RsfStreet => rsf("street"),

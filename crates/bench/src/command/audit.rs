@@ -33,7 +33,7 @@ pub(crate) struct AuditArgs {
     #[arg(long, default_value_t = 500, value_name = "N")]
     verify: usize,
     /// A wrong match looks right with at least this many inliers of SIFT and a homography, if a
-    /// correct reference has fewer; of 413 random pairs of three real datasets none had more than 4
+    /// correct reference has fewer; of 521 random pairs of three real datasets none had more than 4
     #[arg(long, default_value_t = 10, value_name = "N")]
     inliers: usize,
     /// Radii at which methods are ranked, in metres
