@@ -30,9 +30,13 @@ impl NewFile {
     ///
     /// # Errors
     ///
-    /// [`Error::Io`] if the folder cannot be written.
+    /// [`Error::Io`] if the folder cannot be written, or `target` is a folder.
     pub fn create(target: &Path) -> Result<Self> {
         static COUNTER: AtomicU64 = AtomicU64::new(0);
+        if target.is_dir() {
+            let source = io::Error::new(io::ErrorKind::IsADirectory, "a folder, not a file");
+            return Err(Error::Io { path: target.to_owned(), source });
+        }
         let name = target.file_name().ok_or_else(|| Error::Io {
             path: target.to_owned(),
             source: io::Error::new(io::ErrorKind::InvalidInput, "not the name of a file"),

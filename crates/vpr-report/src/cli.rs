@@ -159,6 +159,15 @@ impl ReportArgs {
         (!self.full).then_some(report::BUDGET)
     }
 
+    /// Before the work: whether the report could be written where it is asked for.
+    ///
+    /// # Errors
+    ///
+    /// Those of [`check_out`].
+    pub fn check(&self) -> anyhow::Result<()> {
+        self.path.as_deref().map_or(Ok(()), check_out)
+    }
+
     /// Writes the report if one is asked for; the file appears whole or not at all.
     ///
     /// # Errors

@@ -147,7 +147,7 @@ fn check(args: &CompareArgs) -> anyhow::Result<()> {
     if let Some(path) = &args.per_query {
         cli::check_out(path)?;
     }
-    Ok(())
+    args.report.check()
 }
 
 /// With few resamples no p-value of AUC-PR can be small enough after correction.

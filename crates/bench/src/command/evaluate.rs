@@ -60,6 +60,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     } else {
         Some(input.truth(source.as_ref(), args.input.truth.positive_dist_threshold)?)
     };
+    args.report.check()?;
     let place = Place::create(&args.saving())?;
     let (input, truth) =
         if args.input.skip_bad { input.without_bad(truth)? } else { (input, truth) };

@@ -52,6 +52,7 @@ pub(crate) struct LocalizeArgs {
 }
 
 pub(crate) fn run(args: &LocalizeArgs) -> anyhow::Result<Outcome> {
+    args.report.check()?;
     let map = OpenMap::open(&args.map, Opening { access: Access::Read, trust: false })?;
     let none = || Error::Empty("poses").in_file(&args.map);
     let poses = map.poses()?.ok_or_else(none)?;

@@ -53,7 +53,7 @@ enum ScopeChoice {
 }
 
 pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
-    args.report.path.iter().try_for_each(|path| cli::check_out(path))?;
+    args.report.check()?;
     let input = args.input.open(&[args.estimator])?;
     input.check_poses(&[args.estimator])?;
     let truth = args.truth.truth(&input)?;

@@ -44,7 +44,7 @@ pub(crate) struct EvaluateArgs {
 const DIFFERENCE: &str = "paired bootstrap over queries";
 
 pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
-    args.report.path.iter().try_for_each(|path| cli::check_out(path))?;
+    args.report.check()?;
     let input = args.input.open(&args.estimator)?;
     input.check_poses(&args.estimator)?;
     let truth = args.truth.truth(&input)?;

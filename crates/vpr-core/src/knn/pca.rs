@@ -142,7 +142,7 @@ impl Pca {
     pub fn save(&self, path: &Path) -> Result<()> {
         let text =
             serde_json::to_vec(self).map_err(|err| Error::format(path, "pca", err.to_string()))?;
-        fs::write(path, text).map_err(Error::io(path))
+        Ok(vpr_files::replace(path, &text)?)
     }
 
     /// Reads what [`Self::save`] wrote.

@@ -112,18 +112,12 @@ fn grid(n: usize) -> (usize, f64, f64) {
     }
 }
 
-/// The names of the curves in colour that no title says already, in order.
-fn names<'a>(multiples: &'a [Multiple<'a>]) -> Vec<&'a str> {
-    let mut names: Vec<&str> = Vec::new();
-    for multiple in multiples {
-        for &index in &multiple.shown {
-            let name = multiple.panel.curves[index].name.as_str();
-            if !names.contains(&name) {
-                names.push(name);
-            }
-        }
-    }
-    names
+/// The names of the curves in colour, panel by panel, in order.
+fn names<'a>(multiples: &'a [Multiple<'a>]) -> Vec<Vec<&'a str>> {
+    let names = |it: &'a Multiple<'a>| {
+        it.shown.iter().map(|&index| it.panel.curves[index].name.as_str()).collect()
+    };
+    multiples.iter().map(names).collect()
 }
 
 fn is_said(multiple: &Multiple<'_>, name: &str) -> bool {
@@ -133,8 +127,7 @@ fn is_said(multiple: &Multiple<'_>, name: &str) -> bool {
 /// Puts everything in its place.
 pub(super) fn plan<'a>(multiples: &'a [Multiple<'a>], caption: &str) -> Plan<'a> {
     let (columns, plot_width, plot_height) = grid(multiples.len());
-    let names = names(multiples);
-    let styles = styles(&names);
+    let styles = styles(&names(multiples));
     let is_scatter = |it: &Multiple<'_>| {
         it.shown.iter().any(|&index| it.panel.curves[index].shape == Shape::Points)
     };

@@ -117,22 +117,32 @@ pub fn style_of(name: &str) -> Option<Style> {
     Some(Style { colour, mark })
 }
 
-/// One style per name, the same for the same list: known names have their own, others take what is
-/// left, a colour that nobody has as long as there is one.
-pub(crate) fn styles<'a>(names: &[&'a str]) -> Vec<(&'a str, Style)> {
-    let mut styles: Vec<(&str, Style)> =
-        names.iter().filter_map(|&name| Some((name, style_of(name)?))).collect();
-    for &name in names {
+/// One style per name of these panels, the same for the same panels: known names have their own,
+/// others take what is left, a colour that nobody in their panels has as long as there is one.
+pub(crate) fn styles<'a>(panels: &[Vec<&'a str>]) -> Vec<(&'a str, Style)> {
+    let mut styles: Vec<(&str, Style)> = Vec::new();
+    for &name in panels.iter().flatten() {
+        match style_of(name) {
+            Some(style) if styles.iter().all(|it| it.0 != name) => styles.push((name, style)),
+            _ => {}
+        }
+    }
+    for &name in panels.iter().flatten() {
         if styles.iter().any(|it| it.0 == name) {
             continue;
         }
+        let beside: Vec<&str> =
+            panels.iter().filter(|panel| panel.contains(&name)).flatten().copied().collect();
         let is_new = |style: &Style| styles.iter().all(|it| it.1 != *style);
-        let uses = |colour: usize| styles.iter().filter(|it| it.1.colour == colour).count();
+        let uses = |colour: usize| {
+            let same = || styles.iter().filter(|it| it.1.colour == colour);
+            (same().filter(|it| beside.contains(&it.0)).count(), same().count())
+        };
         // Column by column through the square of colours and marks.
         let all = (0..64).map(|it| Style { colour: it % 8, mark: MARKS[(it + it / 8) % 8] });
         let free = all.filter(is_new).min_by_key(|style| uses(style.colour));
         // Beyond 64 names styles repeat.
-        styles.push((name, free.unwrap_or(Style { colour: names.len() % 8, mark: Circle })));
+        styles.push((name, free.unwrap_or(Style { colour: styles.len() % 8, mark: Circle })));
     }
     styles
 }
@@ -176,7 +186,7 @@ mod tests {
     #[test]
     fn unknown_names_take_free_colours_first() {
         let names = ["SUE", "Z=1", "Z=10", "Z=100", "Z=500", "Z=1000", "Z=5000", "required"];
-        let styles = styles(&names);
+        let styles = styles(&[names.to_vec()]);
         let mut colours: Vec<usize> = styles.iter().map(|it| it.1.colour).collect();
         colours.sort_unstable();
         colours.dedup();
