@@ -11,7 +11,9 @@ use vpr_report::{
     report::Run,
 };
 
-use super::{input::InputArgs, report, threshold::Origin, truth::TruthArgs};
+use super::{
+    input::InputArgs, pictures::PicturesArgs, report, threshold::Origin, truth::TruthArgs,
+};
 
 /// The promise, and the queries it rests on.
 #[derive(clap::Args)]
@@ -38,6 +40,8 @@ pub(crate) struct CalibrateArgs {
     truth: TruthArgs,
     #[command(flatten)]
     report: ReportArgs,
+    #[command(flatten)]
+    pictures: PicturesArgs,
     /// Print one JSON object instead of a sentence; `sue estimate --threshold FILE` reads it
     #[arg(long)]
     json: bool,
@@ -56,9 +60,11 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
     args.report.check()?;
     let input = args.input.open(&[args.estimator])?;
     input.check_poses(&[args.estimator])?;
+    let pictures = args.pictures.open(&input)?;
     let truth = args.truth.truth(&input)?;
     let retrieval = input.retrieve()?;
-    let judged = Judged::new(&retrieval.best(), &truth)?;
+    let best = retrieval.best();
+    let judged = Judged::new(&best, &truth)?;
     let prepared = args.estimator.prepare(&input.settings, input.poses.as_ref())?;
     let uncertainty = prepared.estimate(&retrieval)?;
     let (words, object, threshold) = if let Some(rate) = args.false_acceptance {
@@ -76,10 +82,12 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
     if args.report.path.is_some() {
         let poses = args.truth.query_poses(&input)?;
         let limit = report::at_most(threshold, &uncertainty);
-        let run = report::run(prepared.name(), &retrieval, uncertainty);
+        let inliers = args.pictures.inliers(&pictures, &best)?;
+        let run = report::run(prepared.name(), &retrieval, uncertainty, inliers.as_deref());
         let runs = vec![Run { threshold: Some(limit), ..run }];
         let promise = Some(("promise", words.as_str()));
-        report::write(&args.report, &input, (poses.as_ref(), &truth), runs, promise)?;
+        let places = (poses.as_ref(), &truth);
+        report::write(&args.report, &input, places, &pictures, runs, promise)?;
     }
     if !args.json {
         cli::print(&format!("{words}\n"))?;

@@ -14,7 +14,7 @@ use vpr_report::{
     table::{Cell, Format, Table},
 };
 
-use super::{input::InputArgs, report, truth::TruthArgs};
+use super::{input::InputArgs, pictures::PicturesArgs, report, truth::TruthArgs};
 
 /// Estimators, map, queries and their truth.
 #[derive(clap::Args)]
@@ -35,6 +35,8 @@ pub(crate) struct EvaluateArgs {
     seed: u64,
     #[command(flatten)]
     report: ReportArgs,
+    #[command(flatten)]
+    pictures: PicturesArgs,
     /// Format on stdout
     #[arg(long, value_enum, default_value_t, value_name = "FORMAT")]
     format: Format,
@@ -47,9 +49,11 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     args.report.check()?;
     let input = args.input.open(&args.estimator)?;
     input.check_poses(&args.estimator)?;
+    let pictures = args.pictures.open(&input)?;
     let truth = args.truth.truth(&input)?;
     let retrieval = input.retrieve()?;
-    let judged = Judged::new(&retrieval.best(), &truth)?;
+    let best = retrieval.best();
+    let judged = Judged::new(&best, &truth)?;
     let resampling =
         Resampling { n_resamples: args.resamples, seed: args.seed, ..Resampling::default() };
     let title = format!(
@@ -58,13 +62,15 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         judged.base_rate()
     );
     let mut table = Table::new("evaluation", title);
+    let inliers = args.pictures.inliers(&pictures, &best)?;
     let (mut first, mut runs): (Option<Evaluation<'_>>, Vec<Run>) = (None, Vec::new());
     for choice in &args.estimator {
         let prepared = choice.prepare(&input.settings, input.poses.as_ref())?;
         let uncertainty = prepared.estimate(&retrieval)?;
         let evaluation = Evaluation::new(&uncertainty, &judged)?;
         if args.report.path.is_some() {
-            runs.push(report::run(prepared.name(), &retrieval, uncertainty));
+            let inliers = inliers.as_deref();
+            runs.push(report::run(prepared.name(), &retrieval, uncertainty, inliers));
         }
         push_summary(&mut table, prepared.name(), &evaluation)?;
         match &first {
@@ -79,7 +85,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     cli::print(&table.render_within(args.format, cli::columns()))?;
     if args.report.path.is_some() {
         let poses = args.truth.query_poses(&input)?;
-        report::write(&args.report, &input, (poses.as_ref(), &truth), runs, None)?;
+        report::write(&args.report, &input, (poses.as_ref(), &truth), &pictures, runs, None)?;
     }
     Ok(Outcome::Success)
 }

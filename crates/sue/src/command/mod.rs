@@ -5,6 +5,7 @@ pub(crate) mod estimate;
 pub(crate) mod evaluate;
 mod input;
 mod normalization;
+mod pictures;
 mod report;
 pub(crate) mod run;
 mod scores;

@@ -7,20 +7,30 @@ use vpr_report::{
     cli::{self, ReportArgs},
     report::{Dataset, Match, Report, Run},
 };
+use vpr_study::thumbnails;
 
-use super::input::{Input, name_of};
+use super::{
+    input::{Input, name_of},
+    pictures::Pictures,
+};
 
 /// Matches per query that a report keeps.
 const RANKS: usize = 20;
 
-/// What one estimator says about the best matches.
-pub(super) fn run(estimator: &str, retrieval: &Retrieval, uncertainty: Vec<f64>) -> Run {
+/// What one estimator says about the best matches, with the inliers of each if they were counted.
+pub(super) fn run(
+    estimator: &str,
+    retrieval: &Retrieval,
+    uncertainty: Vec<f64>,
+    inliers: Option<&[usize]>,
+) -> Run {
     let matches = |query: usize| {
         let ranked = retrieval.indices(query).into_iter().zip(retrieval.distances(query));
-        let found = ranked.take(RANKS).map(|(&reference, &distance)| Match {
+        let of_best = inliers.and_then(|it| it.get(query).copied());
+        let found = ranked.take(RANKS).enumerate().map(|(rank, (&reference, &distance))| Match {
             reference,
             distance: f64::from(distance),
-            inliers: None,
+            inliers: of_best.filter(|_| rank == 0),
         });
         found.collect()
     };
@@ -47,9 +57,14 @@ pub(super) fn write(
     args: &ReportArgs,
     input: &Input,
     (query_poses, truth): (Option<&Poses>, &GroundTruth),
+    pictures: &Pictures,
     runs: Vec<Run>,
     fact: Option<(&str, &str)>,
 ) -> anyhow::Result<()> {
+    let side = |paths: &Option<Vec<_>>| paths.clone().unwrap_or_default();
+    let (of_queries, of_references) = (side(&pictures.queries), side(&pictures.references));
+    let made = thumbnails(&of_queries, &of_references);
+    let has_pictures = !(of_queries.is_empty() && of_references.is_empty());
     let names = |n: usize, names: Option<&vpr_core::map::Names>| {
         (0..n).map(|index| name_of(names, index)).collect()
     };
@@ -59,7 +74,7 @@ pub(super) fn write(
         references: names(input.n_references(), input.names.as_ref()),
         poses: query_poses.zip(input.poses.as_ref()),
         truth: Some(truth),
-        thumbnails: None,
+        thumbnails: if has_pictures { Some(&made) } else { None },
         similarities: None,
     };
     let mut facts = vec![

@@ -19,8 +19,9 @@ pub(super) fn style(report: &Report<'_>, run: usize) -> Style {
     let names: Vec<String> = report.runs.iter().map(|run| title(report, run)).collect();
     // Datasets share methods: then the whole title decides, so that no two runs look alike.
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let name = names[run];
     let styles = styles(&[names]);
-    let of = styles.iter().find(|it| it.0 == names[run]);
+    let of = styles.iter().find(|it| it.0 == name);
     of.map_or(Style { colour: 7, mark: crate::figure::Mark::Circle }, |it| it.1)
 }
 
