@@ -11,7 +11,7 @@ import time
 
 N_REGIONS, DEPTH, N_PAIRS = 961, 32, 40
 PUBLISHED_MS = 2.64
-OURS = ["cargo", "run", "--quiet", "-p", "vpr-vision", "--example", "cohog_speed"]
+OURS = ["cargo", "run", "--quiet", "--example", "cohog_speed"]
 NUMPY = [sys.executable, __file__, "numpy"]
 
 

@@ -71,7 +71,7 @@ def training_step(images):
 
 def build() -> Path:
     example = "convolution_time"
-    command = ["cargo", "build", "--quiet", "--package", "vpr-nets", "--example", example]
+    command = ["cargo", "build", "--quiet", "--example", example]
     subprocess.run(command, cwd=ROOT, check=True)
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     return target / "debug/examples" / example

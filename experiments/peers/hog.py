@@ -37,7 +37,7 @@ def cpu_name() -> str:
 
 
 def build() -> Path:
-    command = ["cargo", "build", "--quiet", "--package", "vpr-vision", "--example", "hog_time"]
+    command = ["cargo", "build", "--quiet", "--example", "hog_time"]
     subprocess.run(command, cwd=ROOT, check=True)
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     return target / "debug/examples/hog_time"

@@ -105,7 +105,7 @@ class Vit(nn.Module):
 
 def build() -> Path:
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-    command = ["cargo", "build", "--quiet", "--package", "vpr-nets", "--example", "vit_time"]
+    command = ["cargo", "build", "--quiet", "--example", "vit_time"]
     subprocess.run(command, cwd=ROOT, check=True)
     return target / "debug/examples/vit_time"
 

@@ -56,6 +56,11 @@ pub(super) fn views(dataset: &Dataset<'_>) -> Vec<View> {
 }
 
 impl View {
+    /// Whether it is clearly higher than wide.
+    pub(super) fn is_high(&self) -> bool {
+        self.height > 1.2 * self.width
+    }
+
     fn place(&self, poses: &Poses, index: usize) -> Option<(f64, f64)> {
         let at = poses.position(index);
         let (a, b) = (at[self.axes.0], at[self.axes.1]);

@@ -124,15 +124,18 @@ impl Report<'_> {
         pairs::write(&mut out, self, &judged)?;
         out.write_all(FILTERS.as_bytes())?;
         curves::write(&mut out, self, &judged)?;
-        map::write(&mut out, self, &judged)?;
         scores::write(&mut out, self, &judged)?;
         matrix::write(&mut out, self, &judged)?;
+        // What is high and narrow leaves room for the gallery at its side.
+        let is_high = self.datasets.iter().flat_map(map::views).any(|it| it.is_high());
+        writeln!(out, "<div class=\"places{}\">", if is_high { " beside" } else { "" })?;
+        map::write(&mut out, self, &judged)?;
         data::write(&mut out, self, &judged)?;
         let reserved = out.n + SCRIPT.len() + gallery::RESERVED;
         let left = self.budget.map(|budget| budget.saturating_sub(reserved));
         let pictures = thumbnails::write(&mut out, self, &judged, left)?;
         gallery::write(&mut out, self, &judged, &pictures)?;
-        writeln!(out, "</main>\n<script>{SCRIPT}</script>\n</body>\n</html>")
+        writeln!(out, "</div>\n</main>\n<script>{SCRIPT}</script>\n</body>\n</html>")
     }
 
     fn check(&self) -> Result<(), String> {
