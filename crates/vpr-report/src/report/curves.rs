@@ -10,20 +10,8 @@ use vpr_core::{
 use super::{
     Judged, Report,
     chart::{Chart, Line},
-    summary::{depth, recall, title},
+    summary::{depth, recall, style, title},
 };
-use crate::figure::{Style, styles};
-
-/// The look of a run: that of its method in all figures, or a free one.
-pub(super) fn style(report: &Report<'_>, run: usize) -> Style {
-    let names: Vec<String> = report.runs.iter().map(|run| title(report, run)).collect();
-    // Datasets share methods: then the whole title decides, so that no two runs look alike.
-    let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let name = names[run];
-    let styles = styles(&[names]);
-    let of = styles.iter().find(|it| it.0 == name);
-    of.map_or(Style { colour: 7, mark: crate::figure::Mark::Circle }, |it| it.1)
-}
 
 pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged]) -> io::Result<()> {
     if judged.iter().all(|it| it.correct.is_none()) {

@@ -3,7 +3,10 @@
 use std::io::{self, Write};
 
 use super::{
-    Dataset, Judged, Report, curves::style, json, map::views, outcome::label, summary::title,
+    Dataset, Judged, Report, json,
+    map::views,
+    outcome::label,
+    summary::{style, title},
 };
 
 /// Matches per query that the gallery shows.

@@ -7,7 +7,8 @@ use vpr_core::{
     metrics::bootstrap::{Interval, Z_95, wilson_interval},
 };
 
-use super::{Judged, Report, Run, chart::sample, curves::style, escape, outcome::label, short};
+use super::{Judged, Report, Run, chart::sample, escape, outcome::label, short};
+use crate::figure::{Mark, Style, styles};
 
 /// Ranks of recall@N.
 const RANKS: [usize; 4] = [1, 5, 10, 20];
@@ -113,4 +114,15 @@ fn areas(report: &Report<'_>, run: &Run, judged: &Judged) -> [String; 2] {
 fn interval(interval: &Interval) -> String {
     let Interval { estimate, low, high, .. } = interval;
     format!("{estimate:.3} <small>({low:.2}–{high:.2})</small>")
+}
+
+/// The look of a run: that of its method in all figures, or a free one.
+pub(super) fn style(report: &Report<'_>, run: usize) -> Style {
+    let names: Vec<String> = report.runs.iter().map(|run| title(report, run)).collect();
+    // Datasets share methods: then the whole title decides, so that no two runs look alike.
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let name = names[run];
+    let styles = styles(&[names]);
+    let of = styles.iter().find(|it| it.0 == name);
+    of.map_or(Style { colour: 7, mark: Mark::Circle }, |it| it.1)
 }
