@@ -48,6 +48,9 @@ pub(crate) struct Args {
     /// Measure timings as well; they differ from run to run
     #[arg(long)]
     timings: bool,
+    /// With --timings: the device that table 3.8 is timed on, `wgpu` or `cuda`, or `cuda:1`
+    #[arg(long, value_name = "DEVICE", requires = "timings")]
+    device: Option<String>,
     /// Build networks too, for their rows; pages always have them
     #[arg(long)]
     networks: bool,
@@ -121,6 +124,9 @@ fn reproduce(root: &Path, chapter: &str, ids: &[&str], args: &Args) -> anyhow::R
     if args.timings {
         command.arg("--timings");
     }
+    if let Some(device) = args.device.as_ref().filter(|_| chapter == "bench") {
+        command.args(["--device", device]);
+    }
     let status = command.status().with_context(|| format!("running `{chapter}`"))?;
     Ok(status.code().and_then(|code| u8::try_from(code).ok()).map_or(2, |code| code.min(2)))
 }
@@ -135,6 +141,11 @@ pub(crate) fn workspace_root() -> anyhow::Result<PathBuf> {
 /// all that can be computed. All members of the workspace are selected either way, so that what both
 /// need is built once.
 fn features(chapter: &str, args: &Args) -> &'static [&'static str] {
+    match args.device.as_deref().map(|it| it.split(':').next().unwrap_or(it)) {
+        Some("wgpu") if chapter == "bench" => return &["--features", "vpr-bench/wgpu"],
+        Some("cuda") if chapter == "bench" => return &["--features", "vpr-bench/cuda"],
+        _ => {}
+    }
     let is_page = args.all || args.write || args.check || args.report.is_some();
     if chapter != "bench" || is_page || args.networks {
         return &[];

@@ -12,7 +12,7 @@
 //! let experiment = Experiment::new("table-0", "AUC-PR on three places", study);
 //! let cache = tempfile::tempdir()?;
 //! let sources = Sources::new([], cache.path(), &());
-//! let report = run(&experiment, Context { sources: &sources, timings: false, seed: 0 })?;
+//! let report = run(&experiment, Context { sources: &sources, timings: false, device: None, seed: 0 })?;
 //! assert!(report.table.render(Format::Csv).contains("HOG"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

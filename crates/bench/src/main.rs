@@ -22,7 +22,7 @@ enum Command {
     /// Say what may be wrong with a ground truth, and what its radius decides
     Audit(Box<command::audit::AuditArgs>),
     /// Run an experiment file and compare it with the numbers of the thesis
-    Run(cli::RunArgs),
+    Run(command::run::Args),
     /// Say how many queries find a correct reference, from two folders or two descriptor files
     Evaluate(Box<command::evaluate::EvaluateArgs>),
     /// Say which of several methods differ on the same queries, and how many queries that takes

@@ -30,6 +30,14 @@ pub enum Error {
         /// Every setting that differs.
         differences: Vec<Difference>,
     },
+    /// A device that is not there, or failed.
+    #[error("device {device}: {reason}")]
+    Device {
+        /// Which.
+        device: String,
+        /// What it said.
+        reason: String,
+    },
     /// A pattern of a key is not a regular expression.
     #[error("key pattern `{pattern}`: {reason}")]
     Pattern {
@@ -56,6 +64,7 @@ impl From<Error> for vpr_core::Error {
                 let reason = format!("those of another run:\n{}", lines.join("\n"));
                 Self::format(folder, "settings", reason)
             }
+            Error::Device { device, reason } => Self::format("device", device, reason),
             Error::Pattern { pattern, reason } => {
                 Self::format("key pattern", format!("`{pattern}`"), reason)
             }

@@ -13,6 +13,7 @@
 
 pub mod aggregate;
 pub mod backbone;
+mod device;
 pub mod encode;
 mod error;
 pub mod layer;
@@ -24,6 +25,7 @@ pub mod train;
 pub mod transformer;
 pub mod weights;
 
+pub use device::DeviceChoice;
 pub use error::{Error, Mismatch, Result};
 
 /// The examples of the README, as tests.

@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 
 use anyhow::bail;
-use vpr_nets::encode::{Encoder, Options, Request, Size, by_request, registry::Method};
+use vpr_nets::{
+    DeviceChoice,
+    encode::{Encoder, Options, Request, Size, by_request, registry::Method},
+};
 
 /// Which network, and how images are run through it.
 #[derive(clap::Args, Clone)]
@@ -25,9 +28,10 @@ pub(crate) struct EncoderArgs {
     /// Images per forward pass; images of different sizes need 1
     #[arg(long, alias = "batch_size", default_value_t = 1, value_name = "N")]
     pub(super) batch_size: usize,
-    /// Where to compute; only the processor is built
-    #[arg(long, default_value = "cpu", value_parser = ["cpu"])]
-    device: String,
+    /// Where to compute: cpu, or wgpu or cuda where the program was built with that feature;
+    /// cuda:1 is the second of its kind
+    #[arg(long, default_value_t)]
+    device: DeviceChoice,
 }
 
 impl EncoderArgs {
@@ -46,6 +50,7 @@ impl EncoderArgs {
             weights: self.weights.clone(),
             size,
             roots: data.to_vec(),
+            device: self.device,
         })?;
         if let Some(prefix) = encoder.weights_prefix() {
             vpr_report::cli::note(&format!(

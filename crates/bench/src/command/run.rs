@@ -9,7 +9,19 @@ use vpr_study::Sources;
 /// The name by which experiment files call this program.
 const CHAPTER: &str = "bench";
 
-pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
+/// Experiment files, and where networks are timed.
+#[derive(clap::Args)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    run: RunArgs,
+    /// With --timings: the device that networks are timed on besides, such as wgpu or cuda:1
+    #[arg(long, requires = "timings")]
+    device: Option<String>,
+}
+
+pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let device = args.device.as_deref();
+    let args = &args.run;
     let experiments = args.open::<Study>(CHAPTER)?;
     let bar = Bar::default();
     let (folders, cache) = (args.folders(), args.cache());
@@ -19,7 +31,8 @@ pub(crate) fn run(args: &RunArgs) -> anyhow::Result<Outcome> {
     let mut outcome = Outcome::Success;
     for experiment in &experiments {
         let (timings, seed) = (args.output.timings, experiment.seed);
-        let report = study::run(experiment, Context { sources: &sources, timings, seed })?;
+        let context = Context { sources: &sources, timings, device, seed };
+        let report = study::run(experiment, context)?;
         outcome = outcome.and(cli::finish(experiment, &report, &args.output, &without)?);
     }
     Ok(outcome)

@@ -4,6 +4,7 @@ mod auc_pr;
 mod cost;
 mod datasets;
 mod descriptor_size;
+mod device_cost;
 mod invariance;
 mod lights;
 mod metrics;
@@ -35,7 +36,7 @@ use vpr_report::{
 pub use invariance::Stage;
 pub use platform_speed::TechniqueTiming;
 pub use sheets::Scene;
-use vpr_study::{Runner, Sources, technique::hand_crafted_names};
+use vpr_study::{Runner, Sources, Technique, technique::hand_crafted_names};
 pub use worlds::{Domain, Likeness, Worlds};
 
 /// What to compute; the key `kind` of `[study]` chooses.
@@ -148,6 +149,13 @@ pub enum Study {
         /// Datasets, by id.
         datasets: Vec<String>,
     },
+    /// Times of networks on a device besides the processor: table 3.8.
+    DeviceCost {
+        /// Techniques that the thesis timed.
+        techniques: Vec<Technique>,
+        /// Datasets, by id; the first at hand is timed.
+        timed_on: Vec<String>,
+    },
     /// The best technique on each dataset, and whom it cannot be told from: winners.
     Winners {
         /// Datasets, by id.
@@ -178,6 +186,8 @@ pub struct Context<'a> {
     pub sources: &'a Sources<'a>,
     /// Whether to measure what differs from run to run.
     pub timings: bool,
+    /// On which device networks are timed besides, by name.
+    pub device: Option<&'a str>,
     /// Seed of the bootstrap.
     pub seed: u64,
 }
@@ -230,6 +240,9 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         Study::AucPr { datasets } => auc_pr::run(&mut table, datasets, context)?,
         Study::Cost { timed_on, stored, descriptors } => {
             cost::run(&mut table, timed_on, stored, descriptors, context)?
+        }
+        Study::DeviceCost { techniques, timed_on } => {
+            device_cost::run(&mut table, techniques, timed_on, context)?
         }
         Study::DescriptorSize { datasets, cell_sizes, pca_dimensions, max_region_pairs } => {
             let sweep = descriptor_size::Sweep {

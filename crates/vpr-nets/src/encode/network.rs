@@ -19,6 +19,7 @@ use super::{
 use crate::{
     Result,
     backbone::{EfficientNetLite0Config, efficientnet_lite},
+    device::{DeviceChoice, computed},
     model::{
         self, Model,
         default::{DefaultEncoder, DefaultEncoderConfig},
@@ -41,6 +42,8 @@ pub struct Request {
     pub size: Option<Size>,
     /// Data folders; weights are in `weights/` or `models/` of one of them.
     pub roots: Vec<PathBuf>,
+    /// Where to compute.
+    pub device: DeviceChoice,
 }
 
 /// Length of NetVLAD's descriptors behind its whitening.
@@ -114,7 +117,7 @@ impl Encoder for Network {
 /// # Errors
 ///
 /// [`Error::Unknown`] if there is none of this name; where its weights are from, if they
-/// are not at hand; those of [`Weights::open`] and [`weights::fit`].
+/// are not at hand; those of [`Weights::open`], [`weights::fit`] and [`DeviceChoice::open`].
 pub fn by_name(name: &str, weights: Option<&Path>, roots: &[PathBuf]) -> Result<Box<dyn Encoder>> {
     by_request(&Request {
         name: name.to_owned(),
@@ -133,13 +136,13 @@ pub fn by_name(name: &str, weights: Option<&Path>, roots: &[PathBuf]) -> Result<
 pub fn by_request(request: &Request) -> Result<Box<dyn Encoder>> {
     let method = Method::find(&request.name, request.backbone.as_deref())?;
     let dimension = method.dimension(request.dimension)?;
-    let device = Device::flex();
+    let device = request.device.open()?;
     let mut preprocessing = method.preprocessing();
     preprocessing.size = request.size.unwrap_or(preprocessing.size);
     let open = || method.weights(request.weights.as_deref(), dimension, &request.roots);
     let n_channels = preprocessing.n_channels();
     let build = |weights: Weights| ready(&method, dimension, n_channels, weights, &device);
-    let Fitted { value: network, prefix } = weights::fit(open, build)?;
+    let Fitted { value: network, prefix } = computed(&device, || weights::fit(open, build))??;
     let actual = network.dimension.unwrap_or(dimension);
     if request.dimension.is_some_and(|asked| asked != actual) {
         let name = "descriptors-dimension";

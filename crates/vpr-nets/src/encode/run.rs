@@ -16,7 +16,7 @@ use vpr_core::{Descriptors, Error};
 use vpr_vision::image::{self, ImageSize, RgbImage};
 
 use super::Encoder;
-use crate::Result;
+use crate::{Result, device::computed};
 
 /// How images are run through an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -236,8 +236,11 @@ fn encode_batch(
         crate::Error::format(encoder.name(), value, reason)
     })?;
     let shape = [kept.len(), encoder.preprocessing().n_channels(), size.height, size.width];
-    let tensor = Tensor::<4>::from_data(TensorData::new(values, shape), &encoder.device());
-    let data = encoder.forward(tensor).into_data();
+    let device = encoder.device();
+    let data = computed(&device, || {
+        let tensor = Tensor::<4>::from_data(TensorData::new(values, shape), &device);
+        encoder.forward(tensor).into_data()
+    })?;
     let values = data
         .try_into_vec::<f32>()
         .map_err(|err| crate::Error::format("descriptors", "type", format!("{err:?}")))?;
