@@ -119,8 +119,12 @@ impl<'a> Elements<'a> {
         if len > left {
             return refuse(format!("needs {len} bytes, only {left} follow"));
         }
-        let element =
-            Element { kind, at, data_at: self.start + start, data: &self.bytes[start..start + len] };
+        let element = Element {
+            kind,
+            at,
+            data_at: self.start + start,
+            data: &self.bytes[start..start + len],
+        };
         let is_padded = kind != Kind::Compressed;
         let end = if is_padded { (start + len).next_multiple_of(8) } else { start + len };
         // The last padding of a file may be missing.

@@ -112,7 +112,9 @@ impl MatFile {
         let big_endian = match &header[126..] {
             b"IM" => false,
             b"MI" => true,
-            _ => return refuse(126, "no mark of the order of bytes, so no `.mat` file of version 5"),
+            _ => {
+                return refuse(126, "no mark of the order of bytes, so no `.mat` file of version 5");
+            }
         };
         let version = if big_endian { header[124] } else { header[125] };
         if version != 1 {
@@ -271,7 +273,8 @@ impl Array<'_> {
         let big = self.file.big_endian;
         macro_rules! numbers {
             ($type:ty, $widen:expr) => {{
-                let decode = |&it| if big { <$type>::from_be_bytes(it) } else { <$type>::from_le_bytes(it) };
+                let decode =
+                    |&it| if big { <$type>::from_be_bytes(it) } else { <$type>::from_le_bytes(it) };
                 bytes.as_chunks().0.iter().map(decode).map($widen).collect()
             }};
         }

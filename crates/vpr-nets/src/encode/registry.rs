@@ -70,6 +70,8 @@ pub struct Method {
     std: Option<[f32; 3]>,
     #[serde(default)]
     resize: ResizeEntry,
+    #[serde(default)]
+    equalize: bool,
 }
 
 /// The networks that are built here.
@@ -100,6 +102,20 @@ pub enum Architecture {
     CricaVpr,
     /// GeM on ResNet-50.
     GemResNet50,
+    /// AP-GeM: GeM on ResNet-101, a layer, whitening.
+    ApGem,
+    /// AlexNet to `conv3`, randomly projected.
+    AlexNetConv3,
+    /// CaffeNet to `conv5` under the pyramid of VPR-Bench's code: AMOSNet and HybridNet.
+    PyramidPublished,
+    /// The same under contiguous pyramids (VB-13).
+    PyramidCorrected,
+    /// CALC.
+    Calc,
+    /// Region-VLAD on AlexNet to `conv3`, as VPR-Bench's code finds regions.
+    RegionVladPublished,
+    /// The same with regions of activations that are not zero, as its paper has them.
+    RegionVladCorrected,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -120,6 +136,7 @@ enum Native {
 #[serde(rename_all = "kebab-case")]
 enum InterpolationEntry {
     BilinearOpencv,
+    BicubicOpencv,
     #[default]
     Bilinear,
     Bicubic,
@@ -297,6 +314,7 @@ impl Method {
             },
             interpolation: match self.interpolation {
                 InterpolationEntry::BilinearOpencv => Interpolation::BilinearOpenCv,
+                InterpolationEntry::BicubicOpencv => Interpolation::BicubicOpenCv,
                 InterpolationEntry::Bilinear => Interpolation::Bilinear,
                 InterpolationEntry::Bicubic => Interpolation::Bicubic,
                 InterpolationEntry::Nearest => Interpolation::Nearest,
@@ -308,6 +326,7 @@ impl Method {
             },
             mean: self.mean.unwrap_or(usual.mean),
             std: self.std.unwrap_or(usual.std),
+            equalize: self.equalize,
             resize_after_normalize: matches!(self.resize, ResizeEntry::AfterNormalize),
             ..usual
         }
