@@ -102,7 +102,7 @@ pub enum Architecture {
     CricaVpr,
     /// GeM on ResNet-50.
     GemResNet50,
-    /// AP-GeM: GeM on ResNet-101, a layer, whitening.
+    /// AP-GeM on ResNet-101.
     ApGem,
     /// AlexNet to `conv3`, randomly projected.
     AlexNetConv3,
@@ -112,9 +112,9 @@ pub enum Architecture {
     PyramidCorrected,
     /// CALC.
     Calc,
-    /// Region-VLAD on AlexNet to `conv3`, as VPR-Bench's code finds regions.
+    /// Region-VLAD with the regions of VPR-Bench's code.
     RegionVladPublished,
-    /// The same with regions of activations that are not zero, as its paper has them.
+    /// Region-VLAD with those of its paper.
     RegionVladCorrected,
 }
 
@@ -170,7 +170,7 @@ struct Registry {
 ///
 /// # Panics
 ///
-/// Never: the file is part of the program and tested.
+/// Never: the file is tested.
 #[must_use]
 pub fn methods() -> Vec<Method> {
     let text = include_str!("../../weights.toml");
@@ -355,7 +355,6 @@ mod tests {
         assert_eq!(Method::find("boq", Some("Dinov2")).unwrap().name, "boq-dinov2");
     }
 
-    /// `parser.py` of VPR-methods-evaluation, April 2026.
     #[test]
     fn lengths_are_those_of_the_tool_whose_flags_are_promised() {
         let lengths = [
@@ -384,8 +383,8 @@ mod tests {
     #[test]
     fn a_file_of_another_length_is_named() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::create_dir(folder.path().join("weights")).unwrap();
         let file = folder.path().join("weights/ResNet50_512_cosplace.pth");
+        std::fs::create_dir(folder.path().join("weights")).unwrap();
         std::fs::write(file, b"").unwrap();
         let method = Method::find("cosplace", None).unwrap();
         let err = method.weights(None, 2048, &[folder.path().to_owned()]).unwrap_err().to_string();
