@@ -25,6 +25,10 @@ pub(crate) struct Args {
 enum Network {
     /// `crates/vpr-nets/models/default-encoder.safetensors`
     DefaultEncoder,
+    /// `crates/vpr-vision/models/dense-vlad.safetensors`
+    DenseVlad,
+    /// `crates/vpr-vision/models/hog-vlad.safetensors`
+    HogVlad,
     /// `data/models/btl-default.safetensors`
     Btl,
     /// `data/models/stun-default.safetensors`
@@ -67,11 +71,21 @@ const RSF: [&str; 6] = [
     "--place",
 ];
 
+const DENSE_VLAD: &str = "crates/vpr-vision/models/dense-vlad.safetensors";
+const HOG_VLAD: &str = "crates/vpr-vision/models/hog-vlad.safetensors";
+
+/// `bench train` as a committed vocabulary was made.
+fn vocabulary(name: &'static str, output: &'static str) -> Vec<&'static str> {
+    vec!["train", name, "--output", output]
+}
+
 /// Runs the program and passes its exit code on.
 pub(crate) fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let rsf = |place| ("rsf", [&RSF[..], &[place]].concat());
     let (program, words) = match args.network {
         Network::DefaultEncoder => ("default-encoder", vec!["train"]),
+        Network::DenseVlad => ("bench", vocabulary("dense-vlad", DENSE_VLAD)),
+        Network::HogVlad => ("bench", vocabulary("hog-vlad", HOG_VLAD)),
         Network::Btl => ("sue", vec!["train", "btl"]),
         Network::Stun => ("sue", vec!["train", "stun"]),
         Network::CoprRegressor => ("copr", COPR.to_vec()),

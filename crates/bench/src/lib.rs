@@ -19,7 +19,10 @@
 
 pub mod audit;
 pub mod comparison;
+pub mod rerank;
+pub mod sequence;
 pub mod study;
+pub mod vocabulary;
 
 /// The examples of the README, as tests.
 #[cfg(doctest)]

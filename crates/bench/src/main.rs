@@ -39,6 +39,8 @@ enum Command {
     #[cfg(feature = "networks")]
     /// Say which networks there are and where their weights are from
     Methods(command::methods::MethodsArgs),
+    /// Train a vocabulary on generated places
+    Train(command::train::TrainArgs),
     /// Say everything that is wrong with a dataset folder
     Validate(command::validate::ValidateArgs),
     #[command(flatten)]
@@ -61,6 +63,7 @@ fn main() -> ExitCode {
             Command::Match(args) => command::match_images::run(&args),
             #[cfg(feature = "networks")]
             Command::Methods(args) => command::methods::run(&args),
+            Command::Train(args) => command::train::run(&args),
             Command::Validate(args) => command::validate::run(&args),
             Command::Shell(args) => args.run::<Cli>(),
         }

@@ -73,7 +73,7 @@ fn techniques_are_listed() {
         "HybridNet   from stored matches",
         "CALC        from stored matches",
         "AP-GeM      from stored matches",
-        "DenseVLAD   from stored matches",
+        "DenseVLAD   runs on images, and from stored matches",
     ];
     assert_eq!(
         stdout(&run(&["list", "techniques"])).lines().map(str::trim_end).collect::<Vec<_>>(),

@@ -1,6 +1,9 @@
 //! What can be wrong with a file.
 
-use std::{io, path::PathBuf};
+use std::{
+    io,
+    path::{Path, PathBuf},
+};
 
 /// The result of every fallible function here.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -42,6 +45,24 @@ impl Error {
         reason: impl Into<String>,
     ) -> Self {
         Self::Format { path: path.into(), place: place.into(), reason: reason.into() }
+    }
+}
+
+/// Why bytes were not decoded.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("byte {offset}: {reason}")]
+pub struct Refusal {
+    /// Where the offending opcode, field or object starts.
+    pub offset: usize,
+    /// What is wrong with it.
+    pub reason: String,
+}
+
+impl Refusal {
+    /// The same as an error of the file at `path`, in which the decoded bytes start at byte `start`.
+    #[must_use]
+    pub fn in_file(self, path: &Path, start: usize) -> Error {
+        Error::format(path, format!("byte {}", start + self.offset), self.reason)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Files of the field, read carefully and written whole.
 //!
 //! [`npy`] reads and writes NumPy's arrays and archives, [`pickle`] decodes pickles as data and
-//! never executes them, [`replace()`] makes a file appear whole or not at all: the one way in which
+//! never executes them, [`caffe`] and [`mat`] read Caffe's weights and MATLAB's arrays, [`replace()`] makes a file appear whole or not at all: the one way in which
 //! this workspace writes files that others read.
 //!
 //! ```
@@ -19,14 +19,16 @@
 //! ```
 
 pub mod access;
+pub mod caffe;
 mod dtype;
 mod error;
+pub mod mat;
 pub mod npy;
 pub mod pickle;
 mod replace;
 mod value;
 
-pub use error::{Error, Result, shorten};
+pub use error::{Error, Refusal, Result, shorten};
 pub use replace::{NewFile, replace};
 
 /// The examples of the README, as tests.

@@ -1,13 +1,14 @@
-//! HOG and `CoHOG`, run on image files.
+//! HOG, `CoHOG` and VLADs of local features, run on image files.
 
 use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
-use vpr_core::{Descriptors, Result, metrics::Timing};
+use vpr_core::{Descriptors, Result, map::About, metrics::Timing};
 use vpr_vision::{
     cohog::{self, CoHog, CoHogParams},
     hog::{self, Hog, HogParams},
     image,
+    vlad::VladEncoder,
 };
 
 use crate::describe::{Describe, Features, each, median, timed};
@@ -19,11 +20,39 @@ pub enum HandCrafted {
     Hog(HogParams),
     /// Regional HOG, compared region by region.
     CoHog(CoHogParams),
+    /// What local features add to a vocabulary, one vector per image, compared by cosine.
+    Vlad(Vlad),
+}
+
+/// The vocabularies every clone has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Vlad {
+    /// `DenseVLAD`.
+    Dense,
+    /// Of HOG cells.
+    Hog,
+}
+
+impl Vlad {
+    /// The encoder with its vocabulary.
+    #[must_use]
+    pub fn encoder(self) -> VladEncoder {
+        match self {
+            Self::Dense => VladEncoder::dense_vlad(),
+            Self::Hog => VladEncoder::hog_vlad(),
+        }
+    }
 }
 
 impl Describe for HandCrafted {
     fn key(&self) -> String {
-        format!("{self:?}")
+        match self {
+            Self::Vlad(vlad) => {
+                let encoder = vlad.encoder();
+                format!("{self:?} {:?} {}", encoder.local(), encoder.digest())
+            }
+            _ => format!("{self:?}"),
+        }
     }
 
     fn encode(&self, images: &[PathBuf], step: &(dyn Fn() + Sync)) -> Result<Features> {
@@ -31,9 +60,12 @@ impl Describe for HandCrafted {
             Self::Hog(params) => {
                 let hog = Hog::new(*params)?;
                 let rows = each(images, step, |path| hog.describe(&image::decode(path)?))?;
-                let shape = (images.len(), params.dim());
-                let rows = Array2::from_shape_fn(shape, |(row, column)| rows[row][column]);
-                Descriptors::new(rows).map(Features::Vectors)
+                vectors(&rows, params.dim())
+            }
+            Self::Vlad(vlad) => {
+                let encoder = vlad.encoder();
+                let rows = each(images, step, |path| encoder.describe(&image::decode(path)?))?;
+                vectors(&rows, encoder.dim())
             }
             Self::CoHog(params) => {
                 let cohog = CoHog::new(params.clone())?;
@@ -54,6 +86,12 @@ impl Describe for HandCrafted {
                 let pairs: Vec<_> = rows.iter().zip(rows.iter().skip(1)).collect();
                 timed(&pairs, &mut matching, |(a, b)| hog::similarity(a, b))?;
             }
+            Self::Vlad(vlad) => {
+                let encoder = vlad.encoder();
+                let rows = timed(&decoded, &mut encoding, |image| encoder.describe(image))?;
+                let pairs: Vec<_> = rows.iter().zip(rows.iter().skip(1)).collect();
+                timed(&pairs, &mut matching, |(a, b)| hog::similarity(a, b))?;
+            }
             Self::CoHog(params) => {
                 let cohog = CoHog::new(params.clone())?;
                 let rows = timed(&decoded, &mut encoding, |image| cohog.describe(image))?;
@@ -63,4 +101,16 @@ impl Describe for HandCrafted {
         }
         Ok(Timing { encoding: median(&mut encoding)?, matching: median(&mut matching)? })
     }
+    fn about(&self) -> Option<About> {
+        let Self::Vlad(vlad) = self else { return None };
+        let encoder = Some(format!("{vlad:?} VLAD"));
+        let weights_digest = Some(vlad.encoder().digest());
+        Some(About { encoder, weights_digest, ..About::default() })
+    }
+}
+
+/// One vector of `dim` numbers per image.
+fn vectors(rows: &[Vec<f32>], dim: usize) -> Result<Features> {
+    let rows = Array2::from_shape_fn((rows.len(), dim), |(row, column)| rows[row][column]);
+    Descriptors::new(rows).map(Features::Vectors)
 }

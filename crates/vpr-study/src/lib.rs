@@ -41,7 +41,7 @@ pub mod verification;
 
 pub use describe::{Describe, Features, Matched};
 pub use dial::Dial;
-pub use hand_crafted::HandCrafted;
+pub use hand_crafted::{HandCrafted, Vlad};
 pub use memo::Memo;
 #[cfg(feature = "networks")]
 pub use network::Network;

@@ -13,7 +13,7 @@ use vpr_core::Result;
 use vpr_data::DataRoots;
 use vpr_vision::{cohog::CoHogParams, hog::HogParams};
 
-use crate::{Describe, HandCrafted};
+use crate::{Describe, HandCrafted, Vlad};
 
 /// A technique that runs here.
 #[derive(Clone)]
@@ -50,6 +50,13 @@ const HAND_CRAFTED: [HandCraftedEntry; 3] = [
     ("cohog", "CoHOG", || HandCrafted::CoHog(CoHogParams::default())),
 ];
 
+/// Techniques without a network that run where they are asked for, and have no column where all run:
+/// they take seconds per image, or are no technique of the thesis.
+const ON_REQUEST: [HandCraftedEntry; 2] = [
+    ("dense-vlad", "DenseVLAD", || HandCrafted::Vlad(Vlad::Dense)),
+    ("hog-vlad", "VLAD of HOG cells", || HandCrafted::Vlad(Vlad::Hog)),
+];
+
 /// Networks that have a column wherever their weights are at hand: name in the registry of
 /// weights, column. None is one of the thesis' ten: its NetVLAD is VGG-16. Every other name of that
 /// registry runs as well where it is asked for.
@@ -59,14 +66,20 @@ const NETWORKS: [(&str, &str); 2] =
 /// A technique without a network by its name.
 #[must_use]
 pub fn hand_crafted(name: &str) -> Option<Runner> {
-    let (name, column, make) = HAND_CRAFTED.into_iter().find(|entry| entry.0 == name)?;
+    let (name, column, make) =
+        HAND_CRAFTED.into_iter().chain(ON_REQUEST).find(|entry| entry.0 == name)?;
     let (name, encoder) = (name.to_owned(), column.to_owned());
     Some(Runner { name, column, encoder, technique: Arc::new(make()) })
 }
 
-/// The names of techniques without a network.
+/// The names of techniques without a network that have a column.
 pub fn hand_crafted_names() -> impl Iterator<Item = &'static str> {
     HAND_CRAFTED.into_iter().map(|entry| entry.0)
+}
+
+/// The names of techniques without a network that run where they are asked for.
+pub fn on_request_names() -> impl Iterator<Item = &'static str> {
+    ON_REQUEST.into_iter().map(|entry| entry.0)
 }
 
 /// The techniques that have a column, in order: those without a network, then the networks whose
@@ -145,14 +158,17 @@ fn network(name: &str, _: &DataRoots) -> Result<Found> {
     if NETWORKS.iter().any(|entry| entry.0 == name) {
         return Ok(Found::Absent(format!("{name}: this program was built without networks")));
     }
-    let known = hand_crafted_names().chain(NETWORKS.into_iter().map(|entry| entry.0));
+    let known = hand_crafted_names()
+        .chain(on_request_names())
+        .chain(NETWORKS.into_iter().map(|entry| entry.0));
     let known = known.collect::<Vec<_>>().join(", ");
     Err(Error::Unknown { kind: "technique", name: name.to_owned(), known })
 }
 
 /// One of the ten techniques of the thesis.
 ///
-/// All ten have stored matches for some datasets; HOG and `CoHOG` also run here, from images.
+/// All ten have stored matches for some datasets; HOG, `CoHOG` and `DenseVLAD` also run here, from images,
+/// and the others where their weights are at hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Technique {
     /// `NetVLAD`, VGG-16, 4096 dimensions (Arandjelović et al. 2016).
@@ -217,6 +233,23 @@ impl Technique {
         }
     }
 
+    /// The name where it is typed, as in `--method`.
+    #[must_use]
+    pub fn typed_name(self) -> &'static str {
+        match self {
+            Self::NetVlad => "netvlad",
+            Self::RegionVlad => "regionvlad",
+            Self::CoHog => "cohog",
+            Self::Hog => "hog",
+            Self::AlexNet => "alexnet",
+            Self::AmosNet => "amosnet",
+            Self::HybridNet => "hybridnet",
+            Self::Calc => "calc",
+            Self::ApGem => "ap-gem",
+            Self::DenseVlad => "dense-vlad",
+        }
+    }
+
     /// The name VPR-Bench gives its folder of stored matches and its entries of dictionaries.
     #[must_use]
     pub fn stored_name(self) -> &'static str {
@@ -236,6 +269,8 @@ mod tests {
     #[test]
     fn the_name_is_the_one_in_experiment_files() {
         for technique in Technique::ALL {
+            #[cfg(feature = "networks")]
+            assert!(find(technique.typed_name(), &DataRoots::default()).is_ok());
             assert_eq!(serde_json::to_value(technique).unwrap(), technique.name());
         }
     }

@@ -4,6 +4,8 @@
 //! the gray value and resizing are the ones OpenCV's `imread`, `cvtColor` and `resize` define, because the
 //! descriptors of the field were published through them.
 
+mod cubic;
+mod equalize;
 mod jpeg;
 mod resize;
 
@@ -14,7 +16,7 @@ use kornia_image::Image;
 pub use kornia_image::ImageSize;
 use vpr_core::{Error, Result};
 
-pub use self::resize::resize_bilinear;
+pub use self::{cubic::resize_bicubic, equalize::equalize_luma, resize::resize_bilinear};
 
 /// A colour image: height × width × 3 bytes, red first.
 pub type RgbImage = Image<u8, 3>;

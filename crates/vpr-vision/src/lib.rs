@@ -16,6 +16,7 @@
 //! ```
 
 pub mod cohog;
+pub mod dense_sift;
 pub mod features;
 pub mod hog;
 pub mod image;
@@ -23,6 +24,7 @@ pub mod matching;
 pub mod orb;
 pub mod ransac;
 pub mod sift;
+pub mod vlad;
 
 /// Version of the numbers: raised when a feature, matcher or estimator gives other bits for the
 /// same input. Whoever keeps results keeps it with them, so that they are not taken for another

@@ -12,6 +12,7 @@ use super::{
     report,
     result::{self, OutputFormat},
     retrieved::Retrieved,
+    second_stage::SecondStageArgs,
 };
 
 /// The flags of VPR-methods-evaluation, in kebab case; the names with underscores work too.
@@ -19,7 +20,7 @@ use super::{
 pub(crate) struct EvaluateArgs {
     #[command(flatten)]
     input: InputArgs,
-    /// Technique that describes the images: hog, hog-thesis, cohog, or a network of `bench methods`
+    /// Technique that describes the images: hog, hog-thesis, cohog, dense-vlad, hog-vlad, or a network of `bench methods`
     #[arg(long, default_value = "hog", value_name = "NAME")]
     method: String,
     /// Which N of recall@N to print
@@ -44,6 +45,8 @@ pub(crate) struct EvaluateArgs {
     #[arg(long, alias = "log_dir", default_value = "default", value_name = "NAME")]
     log_dir: String,
     #[command(flatten)]
+    second_stage: SecondStageArgs,
+    #[command(flatten)]
     report: ReportArgs,
 }
 
@@ -51,7 +54,7 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     args.input.start_threads()?;
     ensure!(args.recall_values.iter().all(|&n| n > 0), "`recall-values` 0: recall@0 is no metric");
     let largest = args.recall_values.iter().copied().max().unwrap_or(1);
-    let k = largest.max(args.num_preds_to_save);
+    let k = largest.max(args.num_preds_to_save).max(args.second_stage.rerank.unwrap_or(0));
     // What can be wrong is found before the work: the truth, and where results are saved.
     let input = Input::open(&args.input)?;
     let source = args.input.truth.source();
@@ -66,6 +69,8 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
         if args.input.skip_bad { input.without_bad(truth)? } else { (input, truth) };
     let provenance = input.provenance;
     let retrieved = input.retrieve(&args.input, &args.method, k)?;
+    let (values, folders) = (&args.recall_values, args.input.data.folders());
+    let retrieved = args.second_stage.apply(retrieved, truth.as_ref(), values, k, &folders)?;
     let mut files = Vec::new();
     if let Some(truth) = &truth {
         print(args, provenance, &retrieved, truth)?;

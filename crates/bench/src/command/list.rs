@@ -43,7 +43,9 @@ pub(crate) fn run(args: &ListArgs) -> anyhow::Result<Outcome> {
 fn techniques() -> Vec<String> {
     let line = |technique: Technique| {
         let how = match technique {
-            Technique::Hog | Technique::CoHog => "runs on images, and from stored matches",
+            Technique::Hog | Technique::CoHog | Technique::DenseVlad => {
+                "runs on images, and from stored matches"
+            }
             _ => "from stored matches",
         };
         format!("{:<12}{how}", technique.name())

@@ -1,4 +1,5 @@
-//! `bench methods`: which networks there are, what they need, and where their weights are from.
+//! `bench methods`: which techniques of the thesis run here, which networks there are, what they need,
+//! and where their weights are from.
 
 use std::path::PathBuf;
 
@@ -7,8 +8,10 @@ use vpr_nets::encode::{
     registry::{Architecture, Method, methods},
 };
 use vpr_report::cli::{self, DataArgs, Outcome};
+use vpr_study::{Technique, technique::hand_crafted};
 
-/// Say which networks there are, or everything about one.
+/// Say which of the ten techniques of the thesis run here, which networks there are, or everything about
+/// one network.
 #[derive(clap::Args)]
 pub(crate) struct MethodsArgs {
     /// The one to tell everything about
@@ -21,10 +24,36 @@ pub(crate) fn run(args: &MethodsArgs) -> anyhow::Result<Outcome> {
     let roots = args.data.folders();
     let text = match &args.name {
         Some(name) => everything(&Method::find(name, None)?, &roots),
-        None => methods().iter().map(|method| line(method, &roots)).collect(),
+        None => {
+            let mut text = "the ten techniques of the thesis\n".to_owned();
+            for technique in Technique::ALL {
+                text += &of_the_thesis(technique, &roots)?;
+            }
+            text += "\nnetworks\n";
+            text.extend(methods().iter().map(|method| line(method, &roots)));
+            text
+        }
     };
     cli::print(&text)?;
     Ok(Outcome::Success)
+}
+
+/// Whether a technique of chapter 3 runs here, and else where its weights are from.
+fn of_the_thesis(technique: Technique, roots: &[PathBuf]) -> anyhow::Result<String> {
+    let name = technique.typed_name();
+    let state = if hand_crafted(name).is_some() {
+        "runs here".to_owned()
+    } else {
+        let method = Method::find(name, None)?;
+        let dimension = method.dimensions[0];
+        match method.locate(dimension, roots) {
+            Some(_) => "runs here".to_owned(),
+            None => {
+                format!("weights absent: {}, {}", method.file(dimension), method.origin(dimension))
+            }
+        }
+    };
+    Ok(format!("{:<12}{name:<14}{state}\n", technique.name()))
 }
 
 fn line(method: &Method, roots: &[PathBuf]) -> String {
@@ -63,6 +92,7 @@ fn everything(method: &Method, roots: &[PathBuf]) -> String {
     };
     let filter = match preprocessing.interpolation {
         Interpolation::BilinearOpenCv => "bilinear without antialiasing, as OpenCV",
+        Interpolation::BicubicOpenCv => "bicubic without antialiasing, as OpenCV",
         Interpolation::Bilinear => "bilinear with antialiasing, as Pillow",
         Interpolation::Bicubic => "bicubic with antialiasing, as Pillow",
         Interpolation::Nearest => "nearest",

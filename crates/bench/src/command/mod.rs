@@ -24,5 +24,7 @@ mod report;
 mod result;
 mod retrieved;
 pub(crate) mod run;
+mod second_stage;
 mod several;
+pub(crate) mod train;
 pub(crate) mod validate;

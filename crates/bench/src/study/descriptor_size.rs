@@ -87,6 +87,7 @@ fn kilobytes(technique: &HandCrafted) -> f64 {
     let numbers = match technique {
         HandCrafted::Hog(params) => params.dim(),
         HandCrafted::CoHog(params) => params.n_regions() * params.depth(),
+        HandCrafted::Vlad(vlad) => vlad.encoder().dim(),
     };
     (numbers * size_of::<f32>()) as f64 / 1000.0
 }

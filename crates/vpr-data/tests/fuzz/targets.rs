@@ -19,7 +19,7 @@ use vpr_data::{
     },
     manifest::Manifest,
 };
-use vpr_files::{npy, pickle};
+use vpr_files::{caffe, mat::MatFile, npy, pickle};
 
 /// One parser.
 pub(crate) struct Target {
@@ -71,6 +71,16 @@ macro_rules! folder_target {
             notices_all: false,
             notices_cuts: false,
         }
+    };
+}
+
+/// A target that reads the file `file` by one function of `vpr-files`.
+macro_rules! file_of_weights {
+    ($name:literal, $file:literal, $read:expr) => {
+        read_target!($name, $file, |path: &Path| -> vpr_core::Result<()> {
+            let read: vpr_files::Result<_> = ($read)(path);
+            read.map(|_| ()).map_err(Into::into)
+        })
     };
 }
 
@@ -148,6 +158,13 @@ pub(crate) const TARGETS: &[Target] = &[
     }),
     read_target!("vpr-bench-curves", "a.pickle", read_curves),
     read_target!("vpr-bench-areas", "a.pickle", read_areas),
+    file_of_weights!("caffemodel", "a.caffemodel", caffe::read_model),
+    file_of_weights!("binaryproto", "a.binaryproto", caffe::read_blob),
+    file_of_weights!("mat", "a.mat", |path: &Path| {
+        let file = MatFile::open(path)?;
+        let numbers = |name| file.array_named(name).map(|array| array.to_f64s());
+        Ok(file.names().filter_map(numbers).fold(0, |n, numbers| n + numbers.len()))
+    }),
     Target {
         name: "npy-objects",
         file: "a.npy",
@@ -322,6 +339,17 @@ pub(crate) fn write_seeds(corpus: &Path) {
     for (target, file) in [("colmap-text", "images.txt"), ("colmap-binary", "images.bin")] {
         exchange::write(Format::Colmap, &folder.path().join(file), &six_dof).unwrap();
         seed(target, "sound", &folder.path().join(file));
+    }
+    let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("../vpr-files/tests/golden");
+    for (target, name) in [
+        ("caffemodel", "new.caffemodel"),
+        ("caffemodel", "older.caffemodel"),
+        ("binaryproto", "mean.binaryproto"),
+        ("mat", "compressed.mat"),
+        ("mat", "plain.mat"),
+    ] {
+        let stem = name.split('.').next().unwrap();
+        seed(target, &format!("sound-{stem}"), &weights.join(name));
     }
     seed("pca", "sound", &pca(folder.path()));
     let place = |name: &str| folder.path().join(name);

@@ -34,25 +34,8 @@ use std::path::Path;
 pub use crate::value::{Element, Elements, Tensor, Value};
 pub use unfold::{MAX_DEPTH, MAX_EXPANSION};
 
+pub use crate::Refusal;
 use crate::{Error, Result};
-
-/// Why a pickle was not decoded.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("byte {offset}: {reason}")]
-pub struct Refusal {
-    /// Where in the pickle the offending opcode or object starts.
-    pub offset: usize,
-    /// What is wrong with it.
-    pub reason: String,
-}
-
-impl Refusal {
-    /// The same as an error of the file at `path`, in which the pickle starts at byte `start`.
-    #[must_use]
-    pub fn in_file(self, path: &Path, start: usize) -> Error {
-        Error::format(path, format!("byte {}", start + self.offset), self.reason)
-    }
-}
 
 /// Decodes one pickle that fills all of `bytes`.
 ///

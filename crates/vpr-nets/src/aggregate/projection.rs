@@ -31,6 +31,17 @@ impl GaussianProjection {
         Self { matrix: Tensor::from_data(TensorData::new(values, [from, to]), device) }
     }
 
+    /// The matrix `numpy.random.seed(seed); numpy.random.randn(to, from)`, as VPR-Bench's AlexNet draws
+    /// it: not divided by `√to`, which unit descriptors do not see.
+    #[expect(clippy::cast_possible_truncation, reason = "weights are f32")]
+    #[must_use]
+    pub fn as_numpy(from: usize, to: usize, seed: u32, device: &Device) -> Self {
+        let mut normal = super::mersenne::Normal::new(seed);
+        let values: Vec<f32> = (0..to * from).map(|_| normal.draw() as f32).collect();
+        let matrix = Tensor::<2>::from_data(TensorData::new(values, [to, from]), device);
+        Self { matrix: matrix.transpose() }
+    }
+
     /// `batch × from` to `batch × to`, not normalised.
     #[must_use]
     pub fn forward(&self, descriptors: Tensor<2>) -> Tensor<2> {

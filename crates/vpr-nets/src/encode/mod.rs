@@ -5,6 +5,7 @@
 //! after needs no network library.
 
 mod batches;
+mod caffe;
 mod encoder;
 mod netvlad_mobile;
 mod network;

@@ -9,10 +9,10 @@ use burn::{
     store::ModuleSnapshot,
     tensor::{Device, Tensor, module::adaptive_avg_pool2d},
 };
-use vpr_core::Error;
+use vpr_core::{Definition, Error};
 
 use super::{
-    Encoder, Preprocessing, Size,
+    Encoder, Preprocessing, Size, caffe,
     netvlad_mobile::NetVladMobile,
     registry::{Architecture, Method},
 };
@@ -49,8 +49,8 @@ pub struct Request {
 /// Length of NetVLAD's descriptors behind its whitening.
 const WHITENED: usize = 4096;
 
-type Forward = Box<dyn Fn(Tensor<4>) -> Tensor<2> + Send + Sync>;
-type Accepts = Box<dyn Fn(usize, usize) -> Result<(), String> + Send + Sync>;
+pub(super) type Forward = Box<dyn Fn(Tensor<4>) -> Tensor<2> + Send + Sync>;
+pub(super) type Accepts = Box<dyn Fn(usize, usize) -> Result<(), String> + Send + Sync>;
 
 /// A network with its preprocessing and the digest of its weights.
 pub struct Network {
@@ -66,12 +66,12 @@ pub struct Network {
 }
 
 /// A network with its weights, before it has a name.
-struct Ready {
+pub(super) struct Ready {
     /// What its weights say of its dimension; `None` if they fit one only.
-    dimension: Option<usize>,
-    digest: String,
-    forward: Forward,
-    accepts: Accepts,
+    pub(super) dimension: Option<usize>,
+    pub(super) digest: String,
+    pub(super) forward: Forward,
+    pub(super) accepts: Accepts,
 }
 
 impl Encoder for Network {
@@ -195,11 +195,22 @@ fn ready(
         Architecture::NetVlad => published(model::netvlad(weights, device)?),
         Architecture::CricaVpr => published(model::cricavpr(weights, device)?),
         Architecture::GemResNet50 => published(model::gem_resnet50(weights, device)?),
+        Architecture::ApGem => published(model::ap_gem(weights, device)?),
+        Architecture::AlexNetConv3 => caffe::alexnet_conv3(weights, device)?,
+        Architecture::PyramidPublished => caffe::pyramid(weights, Definition::Published, device)?,
+        Architecture::PyramidCorrected => caffe::pyramid(weights, Definition::Corrected, device)?,
+        Architecture::Calc => caffe::calc(weights, device)?,
+        Architecture::RegionVladPublished => {
+            caffe::region_vlad(weights, Definition::Published, device)?
+        }
+        Architecture::RegionVladCorrected => {
+            caffe::region_vlad(weights, Definition::Corrected, device)?
+        }
     })
 }
 
 /// A module with these weights, and its forward pass as an encoder's.
-fn assembled<M>(
+pub(super) fn assembled<M>(
     mut module: M,
     weights: Weights,
     renames: &[(&str, &str)],

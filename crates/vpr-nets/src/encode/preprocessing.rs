@@ -6,7 +6,9 @@ use fast_image_resize::{
     pixels,
 };
 use vpr_core::Error;
-use vpr_vision::image::{ImageSize, MAX_PIXELS, RgbImage, gray, resize_bilinear};
+use vpr_vision::image::{
+    ImageSize, MAX_PIXELS, RgbImage, equalize_luma, gray, resize_bicubic, resize_bilinear,
+};
 
 use crate::Result;
 
@@ -27,6 +29,8 @@ pub struct Preprocessing {
     pub mean: [f32; 3],
     /// Divided by.
     pub std: [f32; 3],
+    /// Whether the histogram of an image's luma is equalised first.
+    pub equalize: bool,
     /// Whether resized values keep their fraction, as when tensors are resized after they were
     /// normalised; otherwise they are rounded to 8 bits, as images are.
     pub resize_after_normalize: bool,
@@ -55,6 +59,8 @@ pub enum Size {
 pub enum Interpolation {
     /// OpenCV's `INTER_LINEAR`: two taps, no antialiasing.
     BilinearOpenCv,
+    /// OpenCV's `INTER_CUBIC`: four taps, no antialiasing.
+    BicubicOpenCv,
     /// Pillow's and torchvision's bilinear with antialiasing.
     Bilinear,
     /// Pillow's and torchvision's bicubic with antialiasing.
@@ -85,6 +91,7 @@ impl Preprocessing {
             scale: 1.0 / 255.0,
             mean: [0.485, 0.456, 0.406],
             std: [0.229, 0.224, 0.225],
+            equalize: false,
             resize_after_normalize: false,
         }
     }
@@ -125,44 +132,51 @@ impl Preprocessing {
     /// [`Error::Parameter`] if the image has no pixels or would get more than [`MAX_PIXELS`].
     pub fn apply(&self, image: &RgbImage) -> Result<(Vec<f32>, ImageSize)> {
         let size = self.target(image.size());
+        let equalized = self.equalize.then(|| equalize_luma(image));
+        let image = equalized.as_ref().unwrap_or(image);
         match self.channels {
             Channels::Gray => {
                 let gray = gray(image);
-                let values = self.resized(gray.as_slice(), gray.size(), size, resize_gray)?;
+                let values = self.resized::<1>(gray.as_slice(), gray.size(), size)?;
                 Ok((self.normalized::<1>(&values, [0]), size))
             }
             Channels::Rgb | Channels::Bgr => {
-                let values = self.resized(image.as_slice(), image.size(), size, resize_color)?;
+                let values = self.resized::<3>(image.as_slice(), image.size(), size)?;
                 let order = if self.channels == Channels::Rgb { [0, 1, 2] } else { [2, 1, 0] };
                 Ok((self.normalized::<3>(&values, order), size))
             }
         }
     }
 
-    fn resized(
+    fn resized<const C: usize>(
         &self,
         pixels: &[u8],
         from: ImageSize,
         to: ImageSize,
-        open_cv: Resize,
     ) -> Result<Vec<f32>> {
         check(from)?;
         check(to)?;
-        let n_channels = self.n_channels();
         let floats = |pixels: &[u8]| pixels.iter().copied().map(f32::from).collect();
         if from == to {
             return Ok(floats(pixels));
         }
-        if self.interpolation == Interpolation::BilinearOpenCv {
-            return Ok(floats(&open_cv(pixels, from, to)?));
+        let image = || vpr_vision::image::from_pixels::<C>(from, pixels.to_vec());
+        match self.interpolation {
+            Interpolation::BilinearOpenCv => {
+                return Ok(floats(resize_bilinear(&image(), to)?.as_slice()));
+            }
+            Interpolation::BicubicOpenCv => {
+                return Ok(floats(resize_bicubic(&image(), to)?.as_slice()));
+            }
+            _ => {}
         }
         if !self.resize_after_normalize {
-            let kind = if n_channels == 1 { PixelType::U8 } else { PixelType::U8x3 };
+            let kind = if C == 1 { PixelType::U8 } else { PixelType::U8x3 };
             return Ok(floats(&self.filtered(pixels, from, to, kind)?));
         }
         let values: Vec<f32> = floats(pixels);
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_ne_bytes()).collect();
-        let kind = if n_channels == 1 { PixelType::F32 } else { PixelType::F32x3 };
+        let kind = if C == 1 { PixelType::F32 } else { PixelType::F32x3 };
         let bytes = self.filtered(&bytes, from, to, kind)?;
         Ok(bytes.as_chunks().0.iter().map(|&chunk| f32::from_ne_bytes(chunk)).collect())
     }
@@ -182,7 +196,9 @@ impl Preprocessing {
         let mut target = Image::new(side(to.width), side(to.height), kind);
         let algorithm = match self.interpolation {
             Interpolation::Nearest => ResizeAlg::Nearest,
-            Interpolation::Bicubic => ResizeAlg::Convolution(FilterType::CatmullRom),
+            Interpolation::Bicubic | Interpolation::BicubicOpenCv => {
+                ResizeAlg::Convolution(FilterType::CatmullRom)
+            }
             Interpolation::Bilinear | Interpolation::BilinearOpenCv => {
                 ResizeAlg::Convolution(FilterType::Bilinear)
             }
@@ -224,9 +240,6 @@ fn typed<P: PixelTrait>(
     }
 }
 
-/// Resizes interleaved pixels from one size to another.
-type Resize = fn(&[u8], ImageSize, ImageSize) -> vpr_core::Result<Vec<u8>>;
-
 fn check(size: ImageSize) -> Result<()> {
     match size.width.checked_mul(size.height) {
         Some(1..=MAX_PIXELS) => Ok(()),
@@ -237,21 +250,4 @@ fn check(size: ImageSize) -> Result<()> {
         }
         .into()),
     }
-}
-
-fn resize_gray(pixels: &[u8], from: ImageSize, to: ImageSize) -> vpr_core::Result<Vec<u8>> {
-    resize_open_cv::<1>(pixels, from, to)
-}
-
-fn resize_color(pixels: &[u8], from: ImageSize, to: ImageSize) -> vpr_core::Result<Vec<u8>> {
-    resize_open_cv::<3>(pixels, from, to)
-}
-
-fn resize_open_cv<const C: usize>(
-    pixels: &[u8],
-    from: ImageSize,
-    to: ImageSize,
-) -> vpr_core::Result<Vec<u8>> {
-    let image = vpr_vision::image::from_pixels::<C>(from, pixels.to_vec());
-    Ok(resize_bilinear(&image, to)?.as_slice().to_vec())
 }

@@ -70,6 +70,8 @@ pub struct Method {
     std: Option<[f32; 3]>,
     #[serde(default)]
     resize: ResizeEntry,
+    #[serde(default)]
+    equalize: bool,
 }
 
 /// The networks that are built here.
@@ -100,6 +102,20 @@ pub enum Architecture {
     CricaVpr,
     /// GeM on ResNet-50.
     GemResNet50,
+    /// AP-GeM on ResNet-101.
+    ApGem,
+    /// AlexNet to `conv3`, randomly projected.
+    AlexNetConv3,
+    /// CaffeNet to `conv5` under the pyramid of VPR-Bench's code: AMOSNet and HybridNet.
+    PyramidPublished,
+    /// The same under contiguous pyramids (VB-13).
+    PyramidCorrected,
+    /// CALC.
+    Calc,
+    /// Region-VLAD with the regions of VPR-Bench's code.
+    RegionVladPublished,
+    /// Region-VLAD with those of its paper.
+    RegionVladCorrected,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -120,6 +136,7 @@ enum Native {
 #[serde(rename_all = "kebab-case")]
 enum InterpolationEntry {
     BilinearOpencv,
+    BicubicOpencv,
     #[default]
     Bilinear,
     Bicubic,
@@ -153,7 +170,7 @@ struct Registry {
 ///
 /// # Panics
 ///
-/// Never: the file is part of the program and tested.
+/// Never: the file is tested.
 #[must_use]
 pub fn methods() -> Vec<Method> {
     let text = include_str!("../../weights.toml");
@@ -297,6 +314,7 @@ impl Method {
             },
             interpolation: match self.interpolation {
                 InterpolationEntry::BilinearOpencv => Interpolation::BilinearOpenCv,
+                InterpolationEntry::BicubicOpencv => Interpolation::BicubicOpenCv,
                 InterpolationEntry::Bilinear => Interpolation::Bilinear,
                 InterpolationEntry::Bicubic => Interpolation::Bicubic,
                 InterpolationEntry::Nearest => Interpolation::Nearest,
@@ -308,6 +326,7 @@ impl Method {
             },
             mean: self.mean.unwrap_or(usual.mean),
             std: self.std.unwrap_or(usual.std),
+            equalize: self.equalize,
             resize_after_normalize: matches!(self.resize, ResizeEntry::AfterNormalize),
             ..usual
         }
@@ -336,7 +355,6 @@ mod tests {
         assert_eq!(Method::find("boq", Some("Dinov2")).unwrap().name, "boq-dinov2");
     }
 
-    /// `parser.py` of VPR-methods-evaluation, April 2026.
     #[test]
     fn lengths_are_those_of_the_tool_whose_flags_are_promised() {
         let lengths = [
@@ -365,8 +383,8 @@ mod tests {
     #[test]
     fn a_file_of_another_length_is_named() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::create_dir(folder.path().join("weights")).unwrap();
         let file = folder.path().join("weights/ResNet50_512_cosplace.pth");
+        std::fs::create_dir(folder.path().join("weights")).unwrap();
         std::fs::write(file, b"").unwrap();
         let method = Method::find("cosplace", None).unwrap();
         let err = method.weights(None, 2048, &[folder.path().to_owned()]).unwrap_err().to_string();

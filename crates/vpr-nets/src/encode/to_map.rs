@@ -193,6 +193,7 @@ fn about(encoder: &dyn Encoder, coordinates: Option<Coordinates>) -> About {
     };
     let filter = match preprocessing.interpolation {
         Interpolation::BilinearOpenCv => "bilinear, OpenCV",
+        Interpolation::BicubicOpenCv => "bicubic, OpenCV",
         Interpolation::Bilinear => "bilinear, antialiased",
         Interpolation::Bicubic => "bicubic, antialiased",
         Interpolation::Nearest => "nearest",

@@ -1,6 +1,7 @@
 //! Networks on ResNet and VGG16.
 
 use burn::module::Module;
+use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Tensor};
 
 use super::keys::{SEQUENTIAL_RESNET, SEQUENTIAL_VGG, resnet};
@@ -8,13 +9,13 @@ use super::{Describe, Loaded, Parts};
 use crate::Result;
 use crate::aggregate::{
     Boq, BoqConfig, ConvAp, ConvApConfig, CosPlace, CosPlaceConfig, Gem, GemConfig, MixVpr,
-    MixVprConfig, mixvpr as mixing,
+    MixVprConfig, Whitening, mixvpr as mixing,
 };
 use crate::backbone::vgg::Crop;
 use crate::backbone::{ResNet, Vgg16, Vgg16Config};
 use crate::layer::l2_normalize;
 use crate::weights::Shapes;
-use crate::weights::Weights;
+use crate::weights::{Tensor as Stored, Weights};
 
 /// A convolutional backbone: what CosPlace and EigenPlaces were published on.
 #[derive(Module, Debug)]
@@ -152,4 +153,61 @@ pub fn gem_resnet50(weights: Weights, device: &Device) -> Result<Loaded<Parts<Re
     let backbone = resnet(&weights, "backbone.")?;
     let dimension = backbone.channels();
     Loaded::new(backbone.init(device), GemConfig::new().init(device), dimension, weights)
+}
+
+/// The exponent of the variances in AP-GeM's whitening.
+const WHITENING_POWER: f32 = 0.25;
+
+/// AP-GeM on ResNet-101: `Resnet-101-AP-GeM.pt` of `naver/deep-image-retrieval`, with the whitening that
+/// lies beside its weights as tensors `pca.mean`, `pca.components` and `pca.explained_variance`.
+///
+/// # Errors
+///
+/// As [`open`](super::open).
+pub fn ap_gem(mut weights: Weights, device: &Device) -> Result<Loaded<Parts<ResNet, GemWhitened>>> {
+    let shapes = Shapes::new(&weights, "");
+    let (to, from) = (shapes.axis("pca.components", 0)?, shapes.axis("pca.components", 1)?);
+    let mean = weights.take("pca.mean", &[from])?;
+    let mut components = weights.take("pca.components", &[to, from])?;
+    let variance = weights.take("pca.explained_variance", &[to])?;
+    let mut shift = Vec::with_capacity(to);
+    for (row, variance) in components.data.chunks_exact_mut(from).zip(&variance.data) {
+        let scale = variance.powf(WHITENING_POWER);
+        row.iter_mut().for_each(|it| *it /= scale);
+        let dot = |(a, b): (&f32, &f32)| f64::from(*a) * f64::from(*b);
+        #[expect(clippy::cast_possible_truncation, reason = "weights are f32")]
+        shift.push(-row.iter().zip(&mean.data).map(dot).sum::<f64>() as f32);
+    }
+    let mut weights = weights.renamed(&[
+        (r"^adpool\.p$", "aggregator.gem.p"),
+        (r"^fc\.", "aggregator.fc."),
+        (r"^((conv|bn|layer)\d.*)$", "backbone.$1"),
+    ])?;
+    weights.put("aggregator.whitening.weight", components);
+    weights.put("aggregator.whitening.bias", Stored { shape: vec![to], data: shift });
+    let backbone = resnet(&weights, "backbone.")?;
+    let channels = backbone.channels();
+    let middle = Shapes::new(&weights, "aggregator.").axis("fc.weight", 0)?;
+    let head = GemWhitened {
+        gem: GemConfig::new().init(device),
+        fc: LinearConfig::new(channels, middle).init(device),
+        whitening: Whitening::zeros(middle, to, device),
+    };
+    Loaded::new(backbone.init(device), head, to, weights)
+}
+
+/// What AP-GeM makes of a feature map: generalised means, a layer, unit length, whitening, unit length.
+#[derive(Module, Debug)]
+pub struct GemWhitened {
+    gem: Gem,
+    fc: Linear,
+    whitening: Whitening,
+}
+
+impl Describe for Parts<ResNet, GemWhitened> {
+    fn describe(&self, images: Tensor<4>) -> Tensor<2> {
+        let head = &self.aggregator;
+        let pooled = head.gem.forward(self.backbone.forward(images));
+        head.whitening.forward(l2_normalize(head.fc.forward(pooled), 1))
+    }
 }

@@ -13,7 +13,7 @@ use burn::tensor::{Device, Tensor};
 use crate::Result;
 use crate::weights::{Report, Weights};
 
-pub use convolutional::{Trunk, boq_resnet50, convap, cosplace, gem_resnet50, mixvpr};
+pub use convolutional::{Trunk, ap_gem, boq_resnet50, convap, cosplace, gem_resnet50, mixvpr};
 pub use keys::SEQUENTIAL_RESNET;
 pub use netvlad::{NetVladHead, netvlad};
 pub use transformer::{boq_dinov2, cricavpr, salad};

@@ -1,7 +1,7 @@
 //! Published weights: read key by key, never executed.
 //!
 //! `.pth`/`.pt` files of PyTorch (zip archives since 1.6, and the older sequence of pickles) and
-//! `.safetensors`, told apart by content. All become f32; a NaN or infinity is refused.
+//! `.safetensors`, told apart by content; Caffe's `.caffemodel`, by its name. All become f32; a NaN or infinity is refused.
 //! The reader is our own: pickles are decoded by `vpr-core`, a fixed list of opcodes and names,
 //! and what is allocated is bounded by the length of the file.
 //!
@@ -18,6 +18,7 @@
 //! ```
 
 mod apply;
+mod caffe;
 mod checkpoint;
 mod legacy;
 mod prefix;
@@ -123,7 +124,9 @@ impl Weights {
     /// Those of [`Self::open`], reading apart.
     pub fn read(path: &Path, bytes: &[u8]) -> Result<Self> {
         let mut facts = BTreeMap::new();
-        let tensors = if zip::is_archive(bytes) {
+        let tensors = if caffe::is_caffe(path) {
+            caffe::read(path, bytes)?
+        } else if zip::is_archive(bytes) {
             zip::read(path, bytes)?
         } else if legacy::is_legacy(bytes) {
             legacy::read(path, bytes)?
@@ -184,6 +187,11 @@ impl Weights {
             None => mismatch.missing.push(key.to_owned()),
         }
         Err(Error::Weights { path: self.path.clone(), mismatch: Box::new(mismatch) })
+    }
+
+    /// Adds or replaces the tensor of `key`.
+    pub fn put(&mut self, key: &str, tensor: Tensor) {
+        self.tensors.insert(key.to_owned(), tensor);
     }
 
     /// The same tensors under changed keys or shapes; `None` leaves one out.

@@ -53,7 +53,7 @@ fn blend(sums: [i32; 2], weights: [i32; 2]) -> u8 {
     u8::try_from((upper + lower + 2) >> 2).expect("the weights sum to one")
 }
 
-fn check(size: ImageSize) -> Result<()> {
+pub(super) fn check(size: ImageSize) -> Result<()> {
     match size.width.checked_mul(size.height) {
         Some(1..=MAX_PIXELS) => Ok(()),
         _ => Err(Error::Parameter {

@@ -85,22 +85,36 @@ impl Vocabulary {
     ///
     /// [`Error::Mismatch`] if the features have another dimension than the centres.
     pub fn encode(&self, features: &Descriptors, intra_normalise: bool) -> Result<Array1<f32>> {
+        self.encode_all(std::slice::from_ref(features), intra_normalise)
+    }
+
+    /// [`Self::encode`] of several sets of features of one image, such as those of several scales.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::encode`].
+    pub fn encode_all(&self, sets: &[Descriptors], intra_normalise: bool) -> Result<Array1<f32>> {
         let (clusters, dim) = (self.centres.len(), self.centres.dim());
-        let assigned = retrieve(features, &self.centres, 1)?.best();
-        let mut residuals = Array2::<f64>::zeros((clusters, dim));
-        for (index, &cluster) in assigned.iter().enumerate() {
-            let pair = features.row(index).into_iter().zip(self.centres.row(cluster));
-            for (sum, (x, c)) in residuals.row_mut(cluster).iter_mut().zip(pair) {
-                *sum += f64::from(*x) - f64::from(*c);
+        let mut sums = Array2::<f64>::zeros((clusters, dim));
+        let mut counts = vec![0_usize; clusters];
+        for features in sets.iter().filter(|it| !it.is_empty()) {
+            let assigned = retrieve(features, &self.centres, 1)?.best();
+            for (index, &cluster) in assigned.iter().enumerate() {
+                counts[cluster] += 1;
+                let pairs = sums.row_mut(cluster).into_iter().zip(features.row(index));
+                pairs.for_each(|(sum, x)| *sum += f64::from(*x));
             }
         }
-        if intra_normalise {
-            for mut row in residuals.outer_iter_mut() {
+        for ((mut row, centre), count) in
+            sums.outer_iter_mut().zip(self.centres.view().outer_iter()).zip(counts)
+        {
+            row.iter_mut().zip(centre).for_each(|(sum, c)| *sum -= count as f64 * f64::from(*c));
+            if intra_normalise {
                 scale_to_unit(row.iter_mut());
             }
         }
-        scale_to_unit(residuals.iter_mut());
-        Ok(residuals.iter().map(|&x| narrow(x)).collect())
+        scale_to_unit(sums.iter_mut());
+        Ok(sums.iter().map(|&x| narrow(x)).collect())
     }
 }
 
