@@ -53,9 +53,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn map(shift: f64) -> Result<Map, Box<dyn Error>> {
     let at = |row: usize| shift + 0.01 * row as f64;
     #[expect(clippy::cast_possible_truncation, reason = "descriptors are f32")]
-    let value = |(row, column): (usize, usize)| {
-        ((at(row) + 1.7 * column as f64).sin() / 16.0) as f32
-    };
+    let value =
+        |(row, column): (usize, usize)| ((at(row) + 1.7 * column as f64).sin() / 16.0) as f32;
     let rows = Descriptors::new(Array2::from_shape_fn((IMAGES, DIM), value))?;
     let poses = (0..IMAGES).map(|row| Pose::translation(at(row), 0.0, 0.0)).collect();
     Ok(Map::new(rows, Poses::SixDof(poses))?)

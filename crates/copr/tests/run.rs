@@ -117,6 +117,7 @@ const TWO: &str = "scenes = [\n\
     { name = \"Fire\", key = \"fire\", references = [\"seq-01\"], queries = [\"seq-03\"], \
     kept = \"seq-01\", span_m = [0.4, 0.4] },\n]\n";
 const PLANE: &str = "{ method = \"plane\", definition = \"corrected\" }";
+const COPIED: &str = "{ method = \"control\", control = \"copied\" }";
 
 /// Runs a study; what it prints.
 fn run_study(dir: &Path, id: &str, study: &str) -> String {
@@ -288,7 +289,8 @@ const SEQUENCES: &str = "scenes = [\n\
 #[test]
 fn what_is_held_out_is_learned_from_and_compared() {
     let dir = tempfile::tempdir().unwrap();
-    let held_out = "{ method = \"network\", weights = \"models/copr-{encoder}-held-out.safetensors\" }";
+    let held_out =
+        "{ method = \"network\", weights = \"models/copr-{encoder}-held-out.safetensors\" }";
     let study = format!(
         "kind = \"variants\"\nstep_m = 0.2\n{SEQUENCES}\
          plain = {{ name = \"plain\", method = {held_out} }}\nvariants = [\n\
@@ -329,7 +331,7 @@ fn what_is_held_out_is_learned_from_and_compared() {
 fn a_retrieval_is_refined_by_the_pose_between_two_descriptors() {
     let dir = tempfile::tempdir().unwrap();
     let study = format!(
-        "kind = \"coarse-to-fine\"\nstep_m = 0.2\n{SEQUENCES}method = {PLANE}\n\
+        "kind = \"coarse-to-fine\"\nstep_m = 0.2\n{SEQUENCES}method = {COPIED}\n\
          poses = [\"models/copr-{{encoder}}-held-out.safetensors\", \"models/none\"]\n{}",
         ROOMS.replace("hog", "default")
     );

@@ -77,9 +77,9 @@ fn in_room(
         },
         Err(why) => row("dense map".to_owned(), None).push_absent(table, &why),
     }
-    let best = maps.iter().map(|(_, map)| {
-        Ok(retrieve(queries.descriptors(), map.descriptors(), 1)?.best())
-    });
+    let best = maps
+        .iter()
+        .map(|(_, map)| Ok(retrieve(queries.descriptors(), map.descriptors(), 1)?.best()));
     let best = best.collect::<Result<Vec<Vec<usize>>>>()?;
     let mut coarse = Vec::new();
     for ((name, map), best) in maps.iter().zip(&best) {
@@ -87,32 +87,57 @@ fn in_room(
         row(format!("{name}, coarse"), None).push_errors(table, &errors, context)?;
         coarse.push(errors);
     }
+    let found = Found { maps: &maps, best: &best, coarse: &coarse, queries };
     for weights in plan.poses {
-        let file = PathBuf::from(weights.to_string_lossy().replace("{encoder}", encoder));
-        let Some(path) = context.sources.locate(&file)? else {
-            let why = format!("{} is not at hand; `copr train regressor` makes it", file.display());
+        let weights = PathBuf::from(weights.to_string_lossy().replace("{encoder}", encoder));
+        if let Some(path) = context.sources.locate(&weights)? {
+            found.push(table, &PoseNetwork::open(&path)?, &row, context)?;
+        } else {
+            let weights = weights.display();
+            let why = format!("{weights} is not at hand; `copr train regressor` makes it");
             row("sparse map, fine".to_owned(), None).push_absent(table, &why);
-            continue;
-        };
-        let network = PoseNetwork::open(&path)?;
-        let definition = Some(match network.definition() {
-            Definition::Published => "published",
-            Definition::Corrected => "corrected",
-        });
-        let mut fine: Vec<PoseErrors> = Vec::new();
-        for (number, (name, map)) in maps.iter().enumerate() {
-            let found = refined(&network, (map, &best[number]), queries)?;
-            let errors = PoseErrors::of_poses(&found, queries.poses())?;
-            let row = row(format!("{name}, fine"), definition);
-            row.push_errors(table, &errors, context)?;
-            row.push_against(table, (&errors, &coarse[number]), "the coarse pose", context)?;
-            if let Some(sparse) = fine.first() {
-                row.push_against(table, (&errors, sparse), "the sparse map's fine one", context)?;
-            }
-            fine.push(errors);
         }
     }
     Ok(())
+}
+
+/// What was found in the sparse map and, if there is one, in the dense map.
+struct Found<'a> {
+    maps: &'a [(&'a str, Map)],
+    /// The best row for every query.
+    best: &'a [Vec<usize>],
+    coarse: &'a [PoseErrors],
+    queries: &'a Map,
+}
+
+impl Found<'_> {
+    fn push<'r>(
+        &self,
+        table: &mut Table,
+        network: &PoseNetwork,
+        row: &dyn Fn(String, Option<&'static str>) -> Row<'r>,
+        context: Context<'_>,
+    ) -> Result<()> {
+        let definition = match network.definition() {
+            Definition::Published => "published",
+            Definition::Corrected => "corrected",
+        };
+        let mut in_sparse: Option<PoseErrors> = None;
+        for (number, (name, map)) in self.maps.iter().enumerate() {
+            let poses = refined(network, (map, &self.best[number]), self.queries)?;
+            let errors = PoseErrors::of_poses(&poses, self.queries.poses())?;
+            let row = row(format!("{name}, fine"), Some(definition));
+            row.push_errors(table, &errors, context)?;
+            let coarse = (&errors, &self.coarse[number]);
+            row.push_against(table, coarse, "the coarse pose", context)?;
+            if let Some(sparse) = &in_sparse {
+                let sparse = (&errors, sparse);
+                row.push_against(table, sparse, "the sparse map's fine one", context)?;
+            }
+            in_sparse.get_or_insert(errors);
+        }
+        Ok(())
+    }
 }
 
 /// The pose of every query by its best reference and the way from there.

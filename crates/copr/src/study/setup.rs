@@ -70,8 +70,7 @@ impl Shown<'_> {
         let at: Vec<Pose> = targets.iter().map(|it| it.pose).collect();
         let sparse = if whole { images } else { anchors.poses() };
         let is_plain = |row: &usize| anchors.rows().binary_search(row).is_err();
-        let plain: Vec<Pose> =
-            (0..images.len()).filter(is_plain).map(|row| images[row]).collect();
+        let plain: Vec<Pose> = (0..images.len()).filter(is_plain).map(|row| images[row]).collect();
         let mut lists: Vec<(&str, &[Pose])> = vec![("targets", &at)];
         if whole {
             lists.push(("images that are no anchors", &plain));

@@ -125,30 +125,52 @@ fn in_room(
         };
         found.push((variant, errors));
     }
-    let plain = found.first().and_then(|it| it.1.clone().ok());
-    for (number, (variant, errors)) in found.into_iter().enumerate() {
-        let errors = match errors {
-            Ok(errors) => errors,
-            Err(why) => {
-                let row = row(&format!("{MTE}: {}", variant.name));
-                table.push(Cell::absent(row, &scene.name, why));
-                continue;
+    let compared = Compared { row: &row, scene, sparse: &sparse_errors, context };
+    compared.push(table, plan.plain, found)
+}
+
+/// What stands beside each other in a room.
+struct Compared<'a> {
+    /// The row of a metric.
+    row: &'a dyn Fn(&str) -> String,
+    scene: &'a Scene,
+    sparse: &'a PoseErrors,
+    context: Context<'a>,
+}
+
+impl Compared<'_> {
+    /// Differences from the sparse map, and of all but the first from the first, which is plain.
+    fn push(
+        &self,
+        table: &mut Table,
+        plain: &Variant,
+        found: Vec<(&Variant, Result<PoseErrors, String>)>,
+    ) -> Result<()> {
+        let first = found.first().and_then(|it| it.1.clone().ok());
+        for (number, (variant, errors)) in found.into_iter().enumerate() {
+            let errors = match errors {
+                Ok(errors) => errors,
+                Err(why) => {
+                    let row = (self.row)(&format!("{MTE}: {}", variant.name));
+                    table.push(Cell::absent(row, &self.scene.name, why));
+                    continue;
+                }
+            };
+            let against = [
+                (Some(self.sparse), "the sparse map"),
+                (first.as_ref().filter(|_| number > 0), plain.name.as_str()),
+            ];
+            for (other, name) in against {
+                let Some(other) = other else { continue };
+                let gain = errors.mte_against(other, &self.context.resampling())?;
+                let row = (self.row)(&format!("{MTE}, minus that of {name}: {}", variant.name));
+                let (column, n) = (&self.scene.name, errors.len());
+                let cell = Cell::new(row, column, gain.estimate, Provenance::Generated, n);
+                table.push(cell.within(gain.low, gain.high, PAIRED));
             }
-        };
-        let against = [
-            (Some(&sparse_errors), "the sparse map"),
-            (plain.as_ref().filter(|_| number > 0), plan.plain.name.as_str()),
-        ];
-        for (other, name) in against {
-            let Some(other) = other else { continue };
-            let gain = errors.mte_against(other, &context.resampling())?;
-            let row = row(&format!("{MTE}, minus that of {name}: {}", variant.name));
-            let provenance = Provenance::Generated;
-            let cell = Cell::new(row, &scene.name, gain.estimate, provenance, errors.len());
-            table.push(cell.within(gain.low, gain.high, PAIRED));
         }
+        Ok(())
     }
-    Ok(())
 }
 
 impl Variant {
@@ -160,9 +182,7 @@ impl Variant {
     ) -> Result<Targets<'a>> {
         let Some(Keep { share, least }) = self.keep else { return Ok(targets.clone()) };
         let doubts = match least {
-            Doubt::Disagreement => {
-                disagreement(sparse, targets, &*ready.regressor, ready.options)?
-            }
+            Doubt::Disagreement => disagreement(sparse, targets, &*ready.regressor, ready.options)?,
             Doubt::Variance => variances(sparse, targets)?,
             Doubt::Outside => outside(sparse, targets)?,
         };

@@ -101,8 +101,7 @@ mod tests {
 
     #[test]
     fn anchors_disagree_where_their_descriptors_do() {
-        let poses: Vec<Pose> =
-            [0.0, 1.0, 2.0].map(|x| Pose::translation(x, 0.0, 0.0)).to_vec();
+        let poses: Vec<Pose> = [0.0, 1.0, 2.0].map(|x| Pose::translation(x, 0.0, 0.0)).to_vec();
         let rows = Descriptors::new(array![[0.0, 0.0], [0.0, 0.5], [3.0, 4.5]]).unwrap();
         let map = Map::new(rows, Poses::SixDof(poses.clone())).unwrap();
         let anchors = Anchors::of_rows(&poses, &[vec![0, 1, 2]]).unwrap();

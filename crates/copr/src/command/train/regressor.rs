@@ -56,7 +56,13 @@ pub(crate) struct RegressorArgs {
     #[arg(long, requires = "experiment", conflicts_with = "place")]
     held_out: bool,
     /// Learn nothing from these rooms of the experiment, by their keys
-    #[arg(long, requires = "experiment", conflicts_with = "place", value_name = "KEY", value_delimiter = ',')]
+    #[arg(
+        long,
+        requires = "experiment",
+        conflicts_with = "place",
+        value_name = "KEY",
+        value_delimiter = ','
+    )]
     without: Vec<String>,
     #[command(flatten)]
     data: DataArgs,
