@@ -48,7 +48,8 @@ impl PoseErrors {
     /// [`CoreError::OutOfRange`] if one does not exist, [`CoreError::PoseKind`] if a side has no
     /// orientations.
     pub fn of_retrieval(best: &[usize], references: &Poses, queries: &Poses) -> Result<Self> {
-        let (references, queries) = (references.six_dof()?, queries.six_dof()?);
+        let (references, truth) = (references.six_dof()?, queries);
+        let queries = queries.six_dof()?;
         if best.len() != queries.len() {
             let what = "best references, one per query";
             let (expected, actual) = (queries.len(), best.len());
@@ -58,7 +59,24 @@ impl PoseErrors {
         if let Some(&index) = best.iter().find(|&&index| index >= len) {
             return Err(CoreError::OutOfRange { what: "reference", index, len }.into());
         }
-        let pairs = || best.iter().map(|&index| &references[index]).zip(queries);
+        let found: Vec<Pose> = best.iter().map(|&index| references[index]).collect();
+        Self::of_poses(&found, truth)
+    }
+
+    /// Errors of taking each query to be at a pose.
+    ///
+    /// # Errors
+    ///
+    /// [`CoreError::Mismatch`] if there is not a pose for every query, [`CoreError::PoseKind`] if queries
+    /// have no orientations.
+    pub fn of_poses(found: &[Pose], queries: &Poses) -> Result<Self> {
+        let queries = queries.six_dof()?;
+        if found.len() != queries.len() {
+            let what = "poses, one per query";
+            let (expected, actual) = (queries.len(), found.len());
+            return Err(CoreError::Mismatch { what, expected, actual }.into());
+        }
+        let pairs = || found.iter().zip(queries);
         let translation_m = pairs().map(|(a, b)| translation_error(a, b)).collect();
         let rotation_deg = pairs().map(|(a, b)| rotation_error(a, b)).collect();
         Ok(Self { translation_m, rotation_deg })

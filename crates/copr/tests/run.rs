@@ -117,6 +117,7 @@ const TWO: &str = "scenes = [\n\
     { name = \"Fire\", key = \"fire\", references = [\"seq-01\"], queries = [\"seq-03\"], \
     kept = \"seq-01\", span_m = [0.4, 0.4] },\n]\n";
 const PLANE: &str = "{ method = \"plane\", definition = \"corrected\" }";
+const COPIED: &str = "{ method = \"control\", control = \"copied\" }";
 
 /// Runs a study; what it prints.
 fn run_study(dir: &Path, id: &str, study: &str) -> String {
@@ -261,4 +262,117 @@ fn oracle_rows_of_real_poses_are_those_of_an_independent_computation() {
             assert!((value - expected).abs() < 6e-5, "{id}, {scene}: {value}, not {expected}");
         }
     }
+}
+
+/// An H of two halves of the rooms of [`TWO`], as `copr train regressor` makes it.
+fn trained(dir: &Path, path: &str, more: &[&str]) -> (PathBuf, String) {
+    let output = dir.join("data/models/copr-default-held-out.safetensors");
+    fs::create_dir_all(output.parent().unwrap()).unwrap();
+    let (out, work) = (output.to_str().unwrap(), dir.join("work"));
+    let training = "train regressor --held-out --near 9,180 --steps 4 --batch 4 \
+                    --validated-every 2 --layers 1 --experiment";
+    let mut words: Vec<&str> = training.split_whitespace().collect();
+    words.extend([path, "--output", out, "--checkpoints", work.to_str().unwrap()]);
+    words.extend(more);
+    let trained = copr(&words, "2");
+    assert_eq!(trained.status.code(), Some(0), "{}", text(&trained.stderr));
+    (output.clone(), text(&trained.stdout))
+}
+
+/// Two sequences of each room, one of them kept.
+const SEQUENCES: &str = "scenes = [\n\
+    { name = \"Heads\", key = \"heads\", references = [\"seq-02\", \"seq-03\"], \
+    queries = [\"seq-01\"], kept = \"seq-02\", span_m = [0.4, 0.4] },\n\
+    { name = \"Fire\", key = \"fire\", references = [\"seq-01\", \"seq-02\"], \
+    queries = [\"seq-03\"], kept = \"seq-01\", span_m = [0.4, 0.4] },\n]\n";
+
+#[test]
+fn what_is_held_out_is_learned_from_and_compared() {
+    let dir = tempfile::tempdir().unwrap();
+    let held_out =
+        "{ method = \"network\", weights = \"models/copr-{encoder}-held-out.safetensors\" }";
+    let study = format!(
+        "kind = \"variants\"\nstep_m = 0.2\n{SEQUENCES}\
+         plain = {{ name = \"plain\", method = {held_out} }}\nvariants = [\n\
+         {{ name = \"a\", method = {held_out}, keep = {{ share = 0.5, least = \"disagreement\" }} }},\n\
+         {{ name = \"b\", method = {held_out}, keep = {{ share = 0.5, least = \"variance\" }} }},\n\
+         {{ name = \"c\", method = {held_out}, keep = {{ share = 1.0, least = \"outside\" }} }},\n\
+         {{ name = \"d\", method = {{ method = \"network\", weights = \"models/none\" }} }},\n]\n\
+         {}",
+        ROOMS.replace("hog", "default")
+    );
+    let path = write(dir.path(), "variants", &study);
+    // Eight images of a room are left out, all near each other: 2 · 8 · 7 pairs, or half without one.
+    let (_, dry) = trained(dir.path(), &path, &["--dry-run"]);
+    assert!(dry.contains("training pairs: 112\nvalidation pairs: 112\n"), "{dry}");
+    let (_, dry) = trained(dir.path(), &path, &["--dry-run", "--without", "fire"]);
+    assert!(dry.contains("training pairs: 56\n"), "{dry}");
+    trained(dir.path(), &path, &[]);
+    let data = dir.path().join("data");
+    let output = copr(&["run", &path, "--data", data.to_str().unwrap(), "--format", "csv"], "2");
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let out = text(&output.stdout);
+    // Two anchors × 3 × 3 targets.
+    for (row, part) in [
+        ("MTE, m: plain", "18 regressed rows"),
+        ("MTE, m: a", "9 regressed rows"),
+        ("MTE, m: b", "9 regressed rows"),
+        ("MTE, m, minus that of plain: a", "paired bootstrap over queries"),
+        ("MTE, m: d", "is not at hand"),
+    ] {
+        let line = out.lines().find(|it| it.starts_with(&format!("\"{row} /"))).unwrap_or_default();
+        assert!(line.contains(part), "`{row}`, `{part}`: {out}");
+    }
+    let same = out.lines().filter(|it| it.starts_with("\"MTE, m, minus that of plain: c /"));
+    assert!(same.filter(|it| it.contains(",0.0,") || it.contains(",0,")).count() >= 2, "{out}");
+}
+
+#[test]
+fn a_retrieval_is_refined_by_the_pose_between_two_descriptors() {
+    let dir = tempfile::tempdir().unwrap();
+    let study = format!(
+        "kind = \"coarse-to-fine\"\nstep_m = 0.2\n{SEQUENCES}method = {COPIED}\n\
+         poses = [\"models/copr-{{encoder}}-held-out.safetensors\", \"models/none\"]\n{}",
+        ROOMS.replace("hog", "default")
+    );
+    let path = write(dir.path(), "fine", &study);
+    trained(dir.path(), &path, &["--gives", "pose"]);
+    let data = dir.path().join("data");
+    let output = copr(&["run", &path, "--data", data.to_str().unwrap(), "--format", "csv"], "2");
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let out = text(&output.stdout);
+    for row in [
+        "MTE, m: dense map, coarse",
+        "MRE, °: dense map, fine",
+        "MTE, m, minus that of the coarse pose: sparse map, fine",
+        "MTE, m, minus that of the sparse map's fine one: dense map, fine",
+    ] {
+        assert!(out.contains(&format!("\"{row} /")), "`{row}`: {out}");
+    }
+    assert!(out.contains("models/none is not at hand"), "{out}");
+}
+
+#[test]
+fn maps_are_thinned_and_places_are_drawn() {
+    let dir = tempfile::tempdir().unwrap();
+    let study = format!(
+        "kind = \"thinned\"\nevery = [2, 4]\nmethods = [{{ method = \"linear-interpolation\" }}]\n\
+         {SEQUENCES}{ROOMS}"
+    );
+    let out = run_study(dir.path(), "thinned", &study);
+    // Eight images of each of two sequences: 0, 2, 4, 6 and 7 stay.
+    assert!(out.contains("10 of 16 images") && out.contains("6 of 16 images"), "{out}");
+    let regressed = "MTE, m, minus that of all images: every 4th image, dense map, Lin. Interp.";
+    assert!(out.contains(regressed), "{out}");
+    let study = format!("kind = \"setup\"\nstep_m = 0.2\n{SEQUENCES}{ROOMS}");
+    let out = run_study(dir.path(), "setup", &study);
+    assert!(out.contains("targets,\"Heads, extrapolation\",18.0,"), "{out}");
+    assert!(out.contains("targets,\"Heads, interpolation\",5.0,"), "{out}");
+    let rooms = ROOMS.replace("[study.rooms]", "[study.looked.interpolated.rooms]");
+    let study = format!(
+        "kind = \"matches\"\nclasses = {{ near_m = 0.2, middle_m = 0.4 }}\nmethods = [{PLANE}]\n\
+         [study.looked.interpolated]\n{SEQUENCES}{rooms}"
+    );
+    let out = run_study(dir.path(), "interpolated", &study);
+    assert!(out.contains("ground-truth map") && out.contains("oracle"), "{out}");
 }

@@ -5,14 +5,12 @@ use std::path::Path;
 
 use burn::{
     module::Module,
-    nn::{Linear, LinearConfig},
     tensor::{Device, Tensor, TensorData},
 };
 use serde::{Deserialize, Serialize};
 use vpr_core::Error as CoreError;
 use vpr_nets::{
     encode::registry::Method,
-    layer::linear,
     loss::{Triplet, distance_based, relative_pose},
     model::default::{DefaultEncoder, DefaultEncoderConfig},
     regress::RELATIVE_POSE,
@@ -23,6 +21,7 @@ use vpr_nets::{
 use super::{
     Reach, ViewBatch, Views,
     best::{best, keep_if_best},
+    head::RelativeHead,
 };
 use crate::Result;
 
@@ -220,29 +219,6 @@ pub fn train_encoder(
     Ok(())
 }
 
-/// From two descriptors to the pose between their cameras: two linear layers without an activation
-/// between them, as released but for the dropout.
-#[derive(Module, Debug)]
-struct RelativeHead {
-    hidden: Linear,
-    pose: Linear,
-}
-
-impl RelativeHead {
-    fn new(dimension: usize) -> Self {
-        let device = device();
-        Self {
-            hidden: LinearConfig::new(2 * dimension, 2 * dimension).init(&device),
-            pose: LinearConfig::new(2 * dimension, RELATIVE_POSE).init(&device),
-        }
-    }
-
-    fn forward(&self, firsts: Tensor<2>, seconds: Tensor<2>) -> Tensor<2> {
-        let both = Tensor::cat(vec![firsts, seconds], 1);
-        linear(&self.pose, linear(&self.hidden, both))
-    }
-}
-
 /// An encoder while it learns.
 #[derive(Module, Debug)]
 struct Student {
@@ -267,7 +243,7 @@ impl Learner for Student {
             EncoderLoss::Relative => {
                 let truth = TensorData::new(batch.relative, [n, RELATIVE_POSE]);
                 let truth = Tensor::from_data(truth, device);
-                relative_pose(self.head.forward(part(0), part(1)), truth)
+                relative_pose(self.head.forward(part(0), part(1), false), truth)
             }
             EncoderLoss::Distance => {
                 let metres = Tensor::from_data(TensorData::new(batch.metres, [n, 1]), device);

@@ -1,9 +1,10 @@
 //! Training of H on descriptors of a frozen encoder.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use burn::{
     module::Module,
+    store::ModuleSnapshot,
     tensor::{Device, Tensor, TensorData},
 };
 use vpr_core::{Definition, Error as CoreError};
@@ -135,20 +136,41 @@ pub fn train(
     run: &mut Run,
     folder: &Path,
     (output, facts): (&Path, &[(&str, String)]),
-    mut observe: impl FnMut(&Report, f64) -> vpr_core::Result<()>,
+    observe: impl FnMut(&Report, f64) -> vpr_core::Result<()>,
 ) -> Result<NetworkRegressor> {
-    settings.check(training, validation)?;
     let config =
         DescriptorRegressorConfig::new(training.dim()).with_hidden_layers(settings.hidden_layers);
     let fresh = seeded(Pupil { network: config.init(&device()) }, settings.seed);
+    let pairs = (training, validation);
+    let (step, loss, path) =
+        fitted(settings, fresh, pairs, (run, folder), |pupil| &pupil.network, observe)?;
+    let mut network = config.init(&Device::flex());
+    Weights::open(&path)?.apply(&mut network)?;
+    let mut facts = facts.to_vec();
+    facts.push(("best", format!("step {step}, validation loss {loss:.5}")));
+    weights::save(&network, output, &facts, Precision::Half)?;
+    NetworkRegressor::open(output)
+}
+
+/// Trains what learns from pairs; step, loss and file of the best network, which is the part of the
+/// learner that `network` names.
+pub(super) fn fitted<M: Learner<Batch = PairBatch>, N: ModuleSnapshot>(
+    settings: &Training,
+    fresh: M,
+    (training, validation): (&Pairs, &Pairs),
+    (run, folder): (&mut Run, &Path),
+    network: impl Fn(&M) -> &N,
+    mut observe: impl FnMut(&Report, f64) -> vpr_core::Result<()>,
+) -> Result<(usize, f64, PathBuf)> {
+    settings.check(training, validation)?;
     let schedule =
         Schedule::Steps { rate: settings.rate, every: settings.halved_every, factor: 0.5 };
     let (steps, save_every) = (settings.steps, settings.validated_every);
     let descent = Descent { steps, schedule, optimizer: Optimizer::Adam, save_every };
     let batch = |step| Ok(training.batch(step, settings.batch, settings.seed));
-    let cells = |report: &Report, pupil: &Pupil| {
-        let loss = validation_loss(&pupil.network.valid(), validation, settings.batch);
-        keep_if_best(folder, report.step, loss, &pupil.network)?;
+    let cells = |report: &Report, pupil: &M| {
+        let loss = validation_loss(&pupil.clone().valid(), validation, settings.batch);
+        keep_if_best(folder, report.step, loss, network(pupil))?;
         observe(report, loss)?;
         Ok(vec![
             format!("{:.5}", report.loss),
@@ -159,20 +181,15 @@ pub fn train(
     run.descend(&descent, fresh, batch, cells)?;
     let (step, loss, path) =
         best(folder)?.ok_or_else(|| CoreError::format(folder, "best network", "is not there"))?;
-    let mut network = config.init(&Device::flex());
-    Weights::open(&path)?.apply(&mut network)?;
     run.append("best", &[String::new(), format!("step {step}"), format!("{loss:.5}")])?;
-    let mut facts = facts.to_vec();
-    facts.push(("best", format!("step {step}, validation loss {loss:.5}")));
-    weights::save(&network, output, &facts, Precision::Half)?;
-    NetworkRegressor::open(output)
+    Ok((step, loss, path))
 }
 
 /// Mean of the loss over whole batches.
-fn validation_loss(network: &DescriptorRegressor, pairs: &Pairs, size: usize) -> f64 {
+fn validation_loss<M: Learner<Batch = PairBatch>>(pupil: &M, pairs: &Pairs, size: usize) -> f64 {
     let (mut sum, mut n) = (0.0, 0_usize);
     for batch in pairs.batches(size) {
-        let loss = loss(network, batch, &Device::flex());
+        let loss = pupil.learn(batch, &Device::flex());
         (sum, n) = (sum + f64::from(loss.into_scalar::<f32>()), n + 1);
     }
     sum / n.max(1) as f64

@@ -33,8 +33,27 @@ pub enum Looked {
         /// The generated rooms.
         rooms: Rooms,
     },
+    /// Scenes whose sequences are interpolated.
+    Interpolated {
+        /// The scenes.
+        scenes: Vec<Scene>,
+        /// The generated rooms.
+        rooms: Rooms,
+    },
     /// A place that is made denser to the side.
     Place(Place),
+}
+
+impl Looked {
+    /// Scenes and generated rooms, if it has any.
+    pub(super) fn rooms(&self) -> Option<(&[Scene], &Rooms)> {
+        match self {
+            Self::Rooms { scenes, rooms, .. } | Self::Interpolated { scenes, rooms } => {
+                Some((scenes, rooms))
+            }
+            Self::Place(_) => None,
+        }
+    }
 }
 
 /// Upper ends of the classes of a match, metres.
@@ -55,12 +74,16 @@ pub(super) fn run(
 ) -> Result<Figure> {
     let mut figure = Figure::default();
     match looked {
-        Looked::Rooms { scenes, step_m, rooms } => {
+        Looked::Rooms { scenes, rooms, .. } | Looked::Interpolated { scenes, rooms } => {
+            let step_m = match looked {
+                Looked::Rooms { step_m, .. } => Some(*step_m),
+                _ => None,
+            };
             for scene in scenes {
                 for encoder in &rooms.encoders {
                     for &paths in &rooms.paths {
                         let of = (scene, encoder.as_str(), paths);
-                        let plan = (rooms, *step_m, methods, classes);
+                        let plan = (rooms, step_m, methods, classes);
                         in_room((table, &mut figure), of, plan, context)?;
                     }
                 }
@@ -76,7 +99,7 @@ pub(super) fn run(
 fn in_room(
     (table, figure): (&mut Table, &mut Figure),
     (scene, encoder, paths): (&Scene, &str, Paths),
-    (rooms, step_m, methods, classes): (&Rooms, f64, &[Method], Classes),
+    (rooms, step_m, methods, classes): (&Rooms, Option<f64>, &[Method], Classes),
     context: Context<'_>,
 ) -> Result<()> {
     let label = format!("{}, {}", scene.name, Rooms::label(encoder, paths));
@@ -87,14 +110,27 @@ fn in_room(
             return Ok(());
         }
     };
+    let shown = Shown { label, queries: &room.queries.map, classes };
+    let methods: Vec<Method> = methods.iter().map(|it| it.at(encoder)).collect();
+    let Some(step_m) = step_m else {
+        let all = &room.references.map;
+        let poses = all.poses().six_dof()?;
+        let best = retrieve(shown.queries.descriptors(), all.descriptors(), 1)?.best();
+        let found = (&best[..], all.poses());
+        shown.push((table, figure), "ground-truth map", found, all.poses())?;
+        let anchors = Anchors::every_and_last(poses, &room.references.sequences, rooms.every)?;
+        let left_out: Vec<usize> =
+            (0..all.len()).filter(|it| anchors.rows().binary_search(it).is_err()).collect();
+        let targets = Targets::frames(&anchors, poses, &left_out)?;
+        let sparse = selected(all, anchors.rows())?;
+        return shown.all((table, figure), (&sparse, all, &targets), &methods, context);
+    };
     let sparse = selected(&room.references.map, &room.kept.clone().collect::<Vec<_>>())?;
     let poses = sparse.poses().six_dof()?;
     let anchors = Anchors::every(poses, &sequences(None, sparse.len()), rooms.every)?;
     let grid = Grid::new(scene.span_m, step_m, Definition::Corrected)?;
     let targets = Targets::around(&anchors, &grid)?;
-    let shown = Shown { label, queries: &room.queries.map, classes };
-    let methods: Vec<Method> = methods.iter().map(|it| it.at(encoder)).collect();
-    shown.all((table, figure), (&sparse, &targets), &methods, context)
+    shown.all((table, figure), (&sparse, &sparse, &targets), &methods, context)
 }
 
 fn beside(
@@ -117,7 +153,8 @@ fn beside(
     let targets = opened.targets(place.targets, &anchors)?;
     let methods: Vec<Method> = methods.iter().map(|it| it.at(&place.key)).collect();
     let shown = Shown { label, queries: &opened.queries, classes };
-    shown.all((table, figure), (&opened.references, &targets), &methods, context)
+    let map = &opened.references;
+    shown.all((table, figure), (map, map, &targets), &methods, context)
 }
 
 /// Queries whose matches are shown.
@@ -128,11 +165,11 @@ struct Shown<'a> {
 }
 
 impl Shown<'_> {
-    /// The sparse map, every method, and what a perfect retrieval would find in the dense map.
+    /// The sparse map, every method on rows of `source`, and what a perfect retrieval would find in the dense map.
     fn all(
         &self,
         (table, figure): (&mut Table, &mut Figure),
-        (sparse, targets): (&Map, &Targets<'_>),
+        (sparse, source, targets): (&Map, &Map, &Targets<'_>),
         methods: &[Method],
         context: Context<'_>,
     ) -> Result<()> {
@@ -149,7 +186,7 @@ impl Shown<'_> {
                     continue;
                 }
             };
-            match densified(sparse, sparse, targets, &ready)? {
+            match densified(sparse, source, targets, &ready)? {
                 Ok((dense, _)) => {
                     let found = (best(&dense)?, dense.poses());
                     self.push((table, figure), &name, (&found.0, found.1), sparse.poses())?;

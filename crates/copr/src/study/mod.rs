@@ -6,6 +6,7 @@ mod density;
 mod encoder;
 mod encoders;
 mod extrapolation;
+mod fine;
 mod footprint;
 mod interpolation;
 mod lanes;
@@ -16,8 +17,13 @@ mod real;
 mod rooms;
 mod rows;
 mod sequences;
+mod setup;
 mod stray;
+mod thinned;
+mod variants;
 mod viewpoints;
+
+use std::path::PathBuf;
 
 use serde::Deserialize;
 use vpr_core::{Provenance, metrics::bootstrap::Resampling};
@@ -34,6 +40,7 @@ pub use matches::{Classes, Looked};
 pub use place::{Aside, Place};
 pub use rooms::{Paths, Room, Rooms, Scene, Side};
 pub use sequences::{Images, Recorded};
+pub use variants::{Doubt, Keep, Variant};
 
 use crate::Result;
 
@@ -100,6 +107,55 @@ pub enum Study {
         scenes: Vec<Scene>,
         /// The generated rooms, once for every encoder.
         rooms: Rooms,
+        /// Places of another kind, which no encoder has seen.
+        #[serde(default)]
+        places: Vec<Place>,
+    },
+    /// Where images, anchors, targets and queries are: figure 6.2.
+    Setup {
+        /// The scenes.
+        scenes: Vec<Scene>,
+        /// Distance between targets of a grid, metres.
+        step_m: f64,
+        /// The generated rooms.
+        rooms: Rooms,
+    },
+    /// Other ways to make a map denser beside the plain one, on the same queries.
+    Variants {
+        /// The scenes.
+        scenes: Vec<Scene>,
+        /// Distance between targets, metres.
+        step_m: f64,
+        /// The one that others are compared with.
+        plain: Variant,
+        /// The others.
+        variants: Vec<Variant>,
+        /// The generated rooms, once for every encoder.
+        rooms: Rooms,
+    },
+    /// A retrieval, then the pose between two descriptors, with and without densification.
+    CoarseToFine {
+        /// The scenes.
+        scenes: Vec<Scene>,
+        /// Distance between targets, metres.
+        step_m: f64,
+        /// How descriptors are regressed.
+        method: Method,
+        /// Weights of networks for poses, relative to a data folder; `{encoder}` stands for the encoder.
+        poses: Vec<PathBuf>,
+        /// The generated rooms, once for every encoder.
+        rooms: Rooms,
+    },
+    /// How few images keep the error: every so many-th stays, the others are regressed or missed.
+    Thinned {
+        /// The scenes.
+        scenes: Vec<Scene>,
+        /// Every so many-th image stays.
+        every: Vec<usize>,
+        /// How the others are regressed.
+        methods: Vec<Method>,
+        /// The generated rooms.
+        rooms: Rooms,
     },
     /// Where queries are found: figures 6.8, 6.9 and 6.13.
     Matches {
@@ -151,14 +207,16 @@ impl Study {
             Self::Extrapolation { scenes, rooms, .. }
             | Self::Interpolation { scenes, rooms, .. }
             | Self::Encoders { scenes, rooms, .. }
-            | Self::Viewpoints { scenes, rooms }
+            | Self::Viewpoints { scenes, rooms, .. }
+            | Self::Setup { scenes, rooms, .. }
+            | Self::Variants { scenes, rooms, .. }
+            | Self::CoarseToFine { scenes, rooms, .. }
+            | Self::Thinned { scenes, rooms, .. }
             | Self::Density { scenes, rooms, .. }
             | Self::Stray { scenes, rooms, .. } => Some((scenes, rooms)),
             Self::Footprint { scene, rooms, .. } => Some((std::slice::from_ref(scene), rooms)),
-            Self::Matches { looked: Looked::Rooms { scenes, rooms, .. }, .. } => {
-                Some((scenes, rooms))
-            }
-            Self::Lanes { .. } | Self::Matches { .. } | Self::Sequences { .. } => None,
+            Self::Matches { looked, .. } => looked.rooms(),
+            Self::Lanes { .. } | Self::Sequences { .. } => None,
         }
     }
 }
@@ -209,8 +267,25 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         Study::Footprint { scene, step_m, rooms, places, method } => {
             footprint::run(out, (scene, *step_m, rooms), places, method, context)?;
         }
-        Study::Viewpoints { scenes, rooms } => {
-            figure = Some(viewpoints::run(out, scenes, rooms, context)?);
+        Study::Viewpoints { scenes, rooms, places } => {
+            figure = Some(viewpoints::run(out, scenes, (rooms, places), context)?);
+        }
+        Study::Setup { scenes, step_m, rooms } => {
+            figure = Some(setup::run(out, scenes, (*step_m, rooms), context)?);
+        }
+        Study::Variants { scenes, step_m, plain, variants, rooms } => {
+            let plan = variants::Plan { step_m: *step_m, plain, variants, rooms };
+            variants::run(out, scenes, plan, context)?;
+            average(out);
+        }
+        Study::CoarseToFine { scenes, step_m, method, poses, rooms } => {
+            let plan = fine::Plan { step_m: *step_m, method, poses, rooms };
+            fine::run(out, scenes, plan, context)?;
+            average(out);
+        }
+        Study::Thinned { scenes, every, methods, rooms } => {
+            figure = Some(thinned::run(out, scenes, (every, methods, rooms), context)?);
+            average(out);
         }
         Study::Matches { looked, classes, methods } => {
             figure = Some(matches::run(out, looked, (*classes, methods), context)?);

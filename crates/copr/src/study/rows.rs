@@ -110,6 +110,22 @@ impl Row<'_> {
         Ok(())
     }
 
+    /// How much better in both medians than something else that has a name.
+    pub(super) fn push_against(
+        &self,
+        table: &mut Table,
+        (ours, theirs): (&PoseErrors, &PoseErrors),
+        name: &str,
+        context: Context<'_>,
+    ) -> Result<()> {
+        let n = ours.len();
+        let gain = ours.mte_against(theirs, &context.resampling())?;
+        self.push(table, &format!("{MTE}, minus that of {name}"), &gain, n, PAIRED);
+        let gain = ours.mre_against(theirs, &context.resampling())?;
+        self.push(table, &format!("{MRE}, minus that of {name}"), &gain, n, PAIRED);
+        Ok(())
+    }
+
     /// Cells without a value, and why.
     pub(super) fn push_absent(&self, table: &mut Table, why: &str) {
         for metric in [MTE, MRE] {

@@ -6,16 +6,24 @@ use vpr_report::{
     table::{Cell, Table},
 };
 
-use super::{Context, Paths, Rooms, Scene, dense::localize};
+use vpr_study::technique::Found;
+
+use super::{Context, Paths, Place, Rooms, Scene, dense::localize, encoder, lanes::Opened};
 use crate::Result;
 
 pub(super) fn run(
     table: &mut Table,
     scenes: &[Scene],
-    rooms: &Rooms,
+    (rooms, places): (&Rooms, &[Place]),
     context: Context<'_>,
 ) -> Result<Figure> {
     let mut figure = Figure::default();
+    if !places.is_empty() {
+        figure.panels.push(elsewhere(table, places, rooms, context)?);
+    }
+    if scenes.is_empty() {
+        return Ok(figure);
+    }
     for &paths in &rooms.paths {
         let mut curves = Vec::new();
         for encoder in &rooms.encoders {
@@ -60,4 +68,47 @@ fn of_encoder(
     }
     let curve = Curve::new(encoder, points).of(Provenance::Generated).within(band);
     Ok((!curve.points.is_empty()).then_some(curve))
+}
+
+/// Encoders at places of a kind that they have not seen.
+fn elsewhere(
+    table: &mut Table,
+    places: &[Place],
+    rooms: &Rooms,
+    context: Context<'_>,
+) -> Result<Panel> {
+    let mut curves = Vec::new();
+    for name in &rooms.encoders {
+        let row = format!("MTE, m: {name}");
+        let (mut points, mut band) = (Vec::new(), Vec::new());
+        for (at, place) in places.iter().enumerate() {
+            let runner = match encoder::find(name, context.sources)? {
+                Found::Runs(runner) => runner,
+                Found::Absent(why) => {
+                    table.push(Cell::absent(&row, &place.name, why));
+                    continue;
+                }
+            };
+            let opened = Opened::new((&place.world, &place.name), &runner, context)?;
+            let errors = localize(&opened.references, &opened.queries)?;
+            let mte = errors.accuracy(&context.resampling())?.mte_m;
+            let provenance = Provenance::Generated;
+            let cell = Cell::new(&row, &place.name, mte.estimate, provenance, errors.len());
+            table.push(cell.within(mte.low, mte.high, "bootstrap over queries"));
+            points.push((at as f64, mte.estimate));
+            band.push((mte.low, mte.high));
+        }
+        if !points.is_empty() {
+            curves.push(Curve::new(name, points).of(Provenance::Generated).within(band));
+        }
+    }
+    let name = |(at, place): (usize, &Place)| (at as f64, place.name.clone());
+    Ok(Panel {
+        title: "all references, generated".to_owned(),
+        x_label: "place".to_owned(),
+        y_label: "MTE, m".to_owned(),
+        x_ticks: places.iter().enumerate().map(name).collect(),
+        curves,
+        ..Panel::default()
+    })
 }

@@ -1,11 +1,13 @@
 //! Poses to regress descriptors at.
 
+mod choice;
 mod grid;
 
 use nalgebra::{Isometry3, Translation3, Vector3};
 use serde::{Deserialize, Serialize};
 use vpr_core::{Error as CoreError, Pose};
 
+pub use choice::disagreement;
 pub use grid::Grid;
 
 use crate::{Anchors, Error, Result};

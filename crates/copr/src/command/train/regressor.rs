@@ -8,10 +8,11 @@ use std::{
 };
 
 use anyhow::{bail, ensure};
+use clap::ValueEnum;
 use copr::{
-    net::{Pairs, Training, train},
+    net::{Pairs, Training, train, train_pose},
     sequences,
-    study::{Context, Paths, Place, Study},
+    study::{Context, Paths, Place, Side, Study},
 };
 use vpr_core::{
     Definition, Map, Poses,
@@ -46,10 +47,23 @@ pub(crate) struct RegressorArgs {
     /// Which of the experiment's encoders
     #[arg(long, default_value = "default", value_name = "NAME")]
     encoder: String,
-    /// Train on the first half of each query path and validate on the second, so that no reference is
-    /// seen
-    #[arg(long, requires = "experiment")]
+    /// What it gives: a descriptor, from an anchor's and a pose, or the pose between two descriptors,
+    /// as released (one linear map) or with an activation
+    #[arg(long, value_enum, default_value_t = Gives::Descriptor, value_name = "WHAT")]
+    gives: Gives,
+    /// Learn from the sequences that the experiment leaves out of its maps and validate on those that
+    /// it keeps: no query is seen
+    #[arg(long, requires = "experiment", conflicts_with = "place")]
     held_out: bool,
+    /// Learn nothing from these rooms of the experiment, by their keys
+    #[arg(
+        long,
+        requires = "experiment",
+        conflicts_with = "place",
+        value_name = "KEY",
+        value_delimiter = ','
+    )]
+    without: Vec<String>,
     #[command(flatten)]
     data: DataArgs,
     /// Every so many-th image of a sequence is an anchor [default: 50, or what the experiment says]
@@ -65,7 +79,8 @@ pub(crate) struct RegressorArgs {
     /// Whether H is told of translations in the axes of the world, as released, or of the anchor
     #[arg(long, value_enum, default_value_t = Relative::Corrected, value_name = "NAME")]
     definition: Relative,
-    /// The weights to write; the log lands beside them [default: data/models/copr-<PLACE or ENCODER>.safetensors]
+    /// The weights to write; the log lands beside them [default: data/models/copr-<PLACE or
+    /// ENCODER>.safetensors, before the dot -pose and -held-out if so]
     #[arg(long, value_name = "FILE")]
     output: Option<PathBuf>,
     /// Folder of checkpoints [default: target/copr-<name of the output>]
@@ -97,8 +112,29 @@ pub(crate) struct RegressorArgs {
     dry_run: bool,
 }
 
+/// What a network gives.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Gives {
+    /// H
+    Descriptor,
+    /// The pose of the second image seen from the first
+    Pose,
+    /// The same by one linear map
+    PosePublished,
+}
+
+impl Gives {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Descriptor => "descriptor",
+            Self::Pose => "pose",
+            Self::PosePublished => "pose-published",
+        }
+    }
+}
+
 /// See [`Definition`].
-#[derive(Clone, Copy, clap::ValueEnum)]
+#[derive(Clone, Copy, ValueEnum)]
 enum Relative {
     /// In the axes of the world
     Published,
@@ -144,18 +180,37 @@ impl RegressorArgs {
             return Ok(Outcome::Success);
         }
         let called = self.place.as_deref().unwrap_or(&self.encoder);
-        let name = format!("data/models/copr-{called}.safetensors");
+        let held_out = if self.held_out { "-held-out" } else { "" };
+        let gives = match self.gives {
+            Gives::Descriptor => String::new(),
+            other => format!("-{}", other.name()),
+        };
+        let name = format!("data/models/copr-{called}{gives}{held_out}.safetensors");
         let output = self.output.clone().unwrap_or_else(|| name.into());
         let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let folder = self.checkpoints.clone();
         let folder = folder.unwrap_or_else(|| Path::new("target").join(format!("copr-{stem}")));
-        let facts = settings.facts(&training, &validation, &encoder);
+        let mut facts = settings.facts(&training, &validation, &encoder);
+        if self.gives != Gives::Descriptor {
+            facts.push(("gives", self.gives.name().to_owned()));
+        }
         let log = settings.log(&output.with_extension("log.csv"));
         let mut run = Run::open(&folder, &facts, log)?;
         cli::resumes(&folder);
         let pairs = (&training, &validation);
-        let network = train(&settings, pairs, &mut run, &folder, (&output, &facts), show)?;
-        cli::note(&format!("{}: sha256 {}", output.display(), network.digest()));
+        let definition = match self.gives {
+            Gives::Descriptor => None,
+            Gives::Pose => Some(Definition::Corrected),
+            Gives::PosePublished => Some(Definition::Published),
+        };
+        let written = (output.as_path(), &facts[..]);
+        if let Some(definition) = definition {
+            train_pose(&settings, definition, pairs, &mut run, &folder, written, show)?;
+            cli::note(&format!("generated: {}", output.display()));
+        } else {
+            let network = train(&settings, pairs, &mut run, &folder, written, show)?;
+            cli::note(&format!("{}: sha256 {}", output.display(), network.digest()));
+        }
         Ok(Outcome::Success)
     }
 
@@ -236,20 +291,23 @@ impl RegressorArgs {
         let Some((scenes, rooms)) = experiment.study.rooms() else {
             bail!("{path}: has no generated rooms; `--place` chooses one of its places")
         };
+        let known = || scenes.iter().map(|it| it.key.as_str()).collect::<Vec<&str>>().join(", ");
+        if let Some(key) = self.without.iter().find(|key| scenes.iter().all(|it| it.key != **key)) {
+            bail!("{path}: no room `{key}`; known: {}", known())
+        }
         let every = self.every.unwrap_or(rooms.every);
         let (mut training, mut validation) = (Joined::default(), Joined::default());
-        for scene in scenes {
+        for scene in scenes.iter().filter(|it| !self.without.contains(&it.key)) {
             let room = match rooms.open(scene, &self.encoder, Paths::Own, context)? {
                 Ok(room) => room,
                 Err(why) => bail!("{why}"),
             };
             if self.held_out {
-                for rows in &room.queries.sequences {
-                    let middle = usize::midpoint(rows.start, rows.end);
-                    let halves = (rows.start..middle, middle..rows.end);
-                    training.add(&room.queries.map, slice::from_ref(&halves.0))?;
-                    validation.add(&room.queries.map, slice::from_ref(&halves.1))?;
-                }
+                let Side { map, sequences } = &room.references;
+                let is_left_out = |rows: &&Range<usize>| **rows != room.kept;
+                let left_out: Vec<_> = sequences.iter().filter(is_left_out).cloned().collect();
+                training.add(map, &left_out)?;
+                validation.add(map, slice::from_ref(&room.kept))?;
             } else {
                 training.add(&room.queries.map, &room.queries.sequences)?;
                 validation.add(&room.references.map, &room.references.sequences)?;
