@@ -64,18 +64,7 @@ pub(super) fn write(
     let mut runs = Vec::new();
     for (dataset, (_, trial)) in trials.iter().enumerate() {
         for (name, network) in networks {
-            let found = retrieve(&trial.describe(network)?, &material.describe(network)?, RANKS)?;
-            let matches = |query: usize| {
-                let ranked = found.indices(query).into_iter().zip(found.distances(query));
-                let one = |(&reference, &distance): (&usize, &f32)| Match {
-                    reference,
-                    distance: f64::from(distance),
-                    inliers: None,
-                };
-                ranked.map(|(reference, distance)| one((&reference, distance))).collect()
-            };
-            let matches = (0..found.len()).map(matches).collect();
-            runs.push(Run { name: (*name).to_owned(), dataset, matches, ..Run::default() });
+            runs.push(run(name, dataset, (trial, material), network)?);
         }
     }
     let datasets = trials.iter().zip(&truths).map(|((preset, trial), truth)| {
@@ -103,4 +92,25 @@ pub(super) fn write(
         runs,
         budget: args.budget(),
     })
+}
+
+/// What a network finds of a trial.
+fn run(
+    name: &str,
+    dataset: usize,
+    (trial, material): (&Trial, &Material),
+    network: &DefaultEncoder,
+) -> anyhow::Result<Run> {
+    let found = retrieve(&trial.describe(network)?, &material.describe(network)?, RANKS)?;
+    let matches = |query: usize| {
+        let ranked = found.indices(query).into_iter().zip(found.distances(query));
+        let one = |(&reference, &distance)| Match {
+            reference,
+            distance: f64::from(distance),
+            inliers: None,
+        };
+        ranked.map(one).collect()
+    };
+    let matches = (0..found.len()).map(matches).collect();
+    Ok(Run { name: name.to_owned(), dataset, matches, ..Run::default() })
 }

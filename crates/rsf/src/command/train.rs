@@ -46,10 +46,7 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<Outcome> {
     for path in &args.experiment {
         let experiment = experiment::load::<Study>(path)?;
         ensure!(experiment.chapter == CHAPTER, "{}: not of this chapter", path.display());
-        let (places, encoders) = match &experiment.study {
-            Study::Recalls { places, encoders, .. } => (places, encoders),
-            _ => continue,
-        };
+        let Study::Recalls { places, encoders, .. } = &experiment.study else { continue };
         let Some(place) = places.iter().find(|it| it.key == args.place) else { continue };
         for encoder in encoders {
             let Some(output) = of_place(encoder, place).filter(|it| it.contains(&args.only)) else {

@@ -20,6 +20,9 @@ const BATCH: usize = 16;
 /// Directions in which references differ less than this, as a share of the largest, are none.
 const NOTHING: f64 = 1e-9;
 
+/// References, and their variants by reference and seed.
+type Batch = (Vec<usize>, Vec<(usize, u64)>);
+
 /// How the projection is fitted. `prior` and `ridge` are those, of a few, after which recall was
 /// highest on generated places of other seeds than the chapter's (`docs/parity.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
@@ -93,7 +96,7 @@ impl Whitening {
     }
 
     /// Which variants are drawn: references in batches, each followed by its variants' seeds.
-    fn drawn(&self, n: usize) -> Vec<(Vec<usize>, Vec<(usize, u64)>)> {
+    fn drawn(&self, n: usize) -> Vec<Batch> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         let rows: Vec<usize> = (0..n).collect();
         let batch = |part: &[usize]| {
@@ -132,9 +135,9 @@ impl Whitening {
         }
         let (features, places) = self.with_ridge(features, places)?;
         let whitened = learned_whitening(features.view(), &places, from)?;
-        let seen = features.slice(s![..n, ..]);
+        let (seen, _) = features.view().split_at(Axis(0), n);
         let stacked = stacked(before, &whitened, self.prior, seen)?;
-        turned(&stacked, seen, to)
+        Ok(turned(&stacked, seen, to))
     }
 
     /// Two more images for every feature, of a place of their own, which differ in that feature
@@ -175,7 +178,9 @@ fn means(features: ArrayView2<'_, f32>, places: &[usize]) -> (Vec<Vec<f64>>, Vec
         sums[*place].iter_mut().zip(row).for_each(|(sum, value)| *sum += f64::from(*value));
     }
     for (sum, count) in sums.iter_mut().zip(&counts) {
-        sum.iter_mut().for_each(|it| *it /= count.max(1.0));
+        for it in sum.iter_mut() {
+            *it /= count.max(1.0);
+        }
     }
     let mut middle = vec![0.0; features.ncols()];
     for mean in &sums {
@@ -219,7 +224,7 @@ fn stacked(
 
 /// Turned so that the first `to` numbers hold most of what these features come to; the lengths and
 /// angles of descriptors of references stay if they lie in so many directions.
-fn turned(affine: &Affine, seen: ArrayView2<'_, f32>, to: usize) -> Result<Affine> {
+fn turned(affine: &Affine, seen: ArrayView2<'_, f32>, to: usize) -> Affine {
     let rows = projected(affine, seen);
     let (n, wide) = rows.dim();
     let rows = DMatrix::from_fn(n, wide, |row, column| f64::from(rows[(row, column)]));
@@ -241,7 +246,7 @@ fn turned(affine: &Affine, seen: ArrayView2<'_, f32>, to: usize) -> Result<Affin
     for (mut to, from) in weight.outer_iter_mut().zip(affine.weight.outer_iter()) {
         to.assign(&Array1::from(turned(&from.to_vec())));
     }
-    Ok(padded(&Affine { weight, bias: turned(&affine.bias.to_vec()).into() }, to))
+    padded(&Affine { weight, bias: turned(&affine.bias.to_vec()).into() }, to)
 }
 
 /// With zeros up to `to` numbers.

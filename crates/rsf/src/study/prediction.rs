@@ -29,7 +29,9 @@ pub(super) fn run(
         let dataset = match place.open(sources)? {
             Ok(dataset) => dataset,
             Err(why) => {
-                COLUMNS.iter().for_each(|it| table.push(Cell::absent(&place.name, *it, &why)));
+                for column in COLUMNS {
+                    table.push(Cell::absent(&place.name, column, &why));
+                }
                 continue;
             }
         };
