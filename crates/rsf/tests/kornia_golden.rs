@@ -1,7 +1,5 @@
 //! Our augmentations against Kornia 0.8.1 on given parameters (`data/golden/kornia/make.py`).
 
-#![expect(clippy::unwrap_used, reason = "a golden file that cannot be read fails the test")]
-
 use std::path::{Path, PathBuf};
 
 use ndarray::{Array3, Array4};
