@@ -56,7 +56,7 @@ fn blocks(page: &str) -> Vec<Block<'_>> {
 fn programs() -> PathBuf {
     let test = env::current_exe().unwrap();
     let folder = test.ancestors().nth(2).unwrap().to_owned();
-    for program in ["bench", "sue", "copr", "worlds", "examples/own_regressor"] {
+    for program in ["bench", "rsf", "sue", "copr", "worlds", "examples/own_regressor"] {
         let is_there = folder.join(program).is_file();
         assert!(is_there, "{program} is not built: `cargo test --workspace`, not one package");
     }

@@ -1,7 +1,7 @@
 //! What may lie between a reference and a query of its place: changes of viewpoint and appearance
 //! under Kornia's names and parameter meanings (thesis figure 4.3).
 //!
-//! An [`Augmentation`] has ranges and a probability, an [`Operation`] has numbers. Kornia 0.9 is
+//! An [`Augmentation`] has ranges and a probability, an [`Operation`] has numbers. Kornia 0.8 is
 //! what is followed; its pixels are floats, ours are rounded to bytes after each operation.
 
 mod colour;

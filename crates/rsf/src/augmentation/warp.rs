@@ -8,7 +8,8 @@ use vpr_vision::image::{RgbImage, from_pixels};
 /// Kornia normalises pixels of a matrix by `width − 1` whatever the flag says. Without it, the
 /// sampler then takes the same numbers to mean `width` pixels: everything is stretched by
 /// `width / (width − 1)` and moved by half a pixel. Perspective and affine are sampled so by
-/// default, rotations and crops are not; we do as Kornia does.
+/// default, rotations and crops are not; we do as Kornia up to 0.8 does for perspectives. For affine
+/// maps its grid is that of pixels' centres, so that nothing is stretched there: a known miss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Corners {
     /// Rotations and crops.

@@ -3,16 +3,19 @@
 use std::path::Path;
 
 use rsf::{
-    ReferenceSet,
+    Preset, ReferenceSet,
     net::{
         Finetuning, Material, Outcome, Score, Whitening, default_network, finetune, run_log, whiten,
     },
 };
 use vpr_nets::{
+    model::default::DefaultEncoder,
     train::Run,
     weights::{Precision, save},
 };
-use vpr_report::cli;
+use vpr_report::cli::{self, ReportArgs};
+
+use super::report;
 
 /// Which map, from which weights, into which file.
 pub(crate) struct Adaptation<'a> {
@@ -28,6 +31,8 @@ pub(crate) struct Adaptation<'a> {
     pub(crate) checkpoints: Option<&'a Path>,
     /// Bits of a number.
     pub(crate) precision: Precision,
+    /// A report of references under augmentations, before and after.
+    pub(crate) report: Option<&'a ReportArgs>,
 }
 
 impl Adaptation<'_> {
@@ -35,17 +40,11 @@ impl Adaptation<'_> {
     pub(crate) fn whiten(&self, whitening: &Whitening) -> anyhow::Result<()> {
         let material = Material::open(self.set)?;
         let (network, digest) = default_network(self.weights)?;
-        let fitted = whiten(whitening, network, &material)?;
-        let facts = [
-            ("whitened_from", digest),
-            ("references", format!("{}, digest {}", material.len(), material.digest())),
-            ("variants", format!("{}, {}", whitening.variants, whitening.augmentations.key())),
-            ("seed", whitening.seed.to_string()),
-            ("licence", "MIT OR Apache-2.0".to_owned()),
-        ];
+        let fitted = whiten(whitening, network.clone(), &material)?;
+        let facts = whitening.facts(&material, &digest);
         save(&fitted, self.output, &facts, self.precision)?;
         cli::note(&format!("{}: whitened, {}", self.name, self.output.display()));
-        Ok(())
+        self.show(&material, (&network, &fitted), whitening.seed)
     }
 
     /// Steps under the triplet loss; goes on where a killed run stopped.
@@ -58,12 +57,36 @@ impl Adaptation<'_> {
         let mut facts = settings.facts(&material, &digest);
         let log = run_log(&self.output.with_extension("log.csv"));
         let mut run = Run::open(folder, &facts, log)?;
-        let tuned = finetune(settings, network, (self.set, &material), &mut run, folder, show)?;
+        let tuned =
+            finetune(settings, network.clone(), (self.set, &material), &mut run, folder, show)?;
         facts.push(("best", format!("{}, {}", place(&tuned), told(tuned.best))));
         save(&tuned.network, self.output, &facts, self.precision)?;
         cli::note(&verdict(&tuned));
         cli::note(&format!("{}: {}", self.name, self.output.display()));
-        Ok(())
+        self.show(&material, (&network, &tuned.network), settings.seed)
+    }
+
+    /// What it did to references that are changed, as a line for people and as a report.
+    fn show(
+        &self,
+        material: &Material,
+        (before, after): (&DefaultEncoder, &DefaultEncoder),
+        seed: u64,
+    ) -> anyhow::Result<()> {
+        let Some(args) = self.report else { return Ok(()) };
+        let trial = report::trial(material, Preset::All, seed)?;
+        let recall = |network: &DefaultEncoder| -> rsf::Result<f64> {
+            Ok(trial.score(network, &material.describe(network)?)?.recall)
+        };
+        let (of_before, of_after) = (recall(before)?, recall(after)?);
+        let n = trial.of().len();
+        cli::note(&format!(
+            "R@1 of {n} changed references among all: before {of_before:.3}, after {of_after:.3}"
+        ));
+        let networks = [("before", before), ("after", after)];
+        let title = format!("Adapted to {}", self.name);
+        let trials = [(Preset::All, trial)];
+        report::write(args, (&title, self.set, material), &trials, &networks)
     }
 }
 

@@ -8,7 +8,7 @@ use rsf::{
     net::{Finetuning, Whitening},
 };
 use vpr_nets::weights::Precision;
-use vpr_report::cli::Outcome;
+use vpr_report::cli::{Outcome, ReportArgs};
 
 use super::{adaptation::Adaptation, map::MapArgs};
 
@@ -32,9 +32,12 @@ pub(crate) struct FinetuneArgs {
     /// Folder of checkpoints [default: target/rsf-<name of the output>]
     #[arg(long, value_name = "DIR")]
     checkpoints: Option<PathBuf>,
-    /// Only fit another projection in closed form: seconds, and the trunk stays
+    /// Only fit another projection in closed form, beside the old one: seconds, and the trunk stays
     #[arg(long, conflicts_with_all = ["steps", "rate", "margin", "batch", "frozen"])]
     whitening: bool,
+    /// Share of the old projection that --whitening keeps, from 0 to below 1
+    #[arg(long, default_value_t = Whitening::default().prior, requires = "whitening")]
+    prior: f64,
     /// How queries are made of references
     #[arg(long, value_enum, default_value_t, value_name = "NAME")]
     augmentations: Preset,
@@ -74,12 +77,15 @@ pub(crate) struct FinetuneArgs {
     /// Decides what is held out, drawn and changed
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 pub(crate) fn run(args: &FinetuneArgs) -> anyhow::Result<Outcome> {
     ensure!(args.method == "default", "`{}`: only `default` can be tuned here", args.method);
     let mut settings = args.settings();
     settings.check()?;
+    args.report.check()?;
     let (set, name) = args.map.open()?;
     settings.steps = args.steps.unwrap_or_else(|| settings.steps_for(set.len()));
     let adaptation = Adaptation {
@@ -89,10 +95,12 @@ pub(crate) fn run(args: &FinetuneArgs) -> anyhow::Result<Outcome> {
         output: &args.output,
         checkpoints: args.checkpoints.as_deref(),
         precision: if args.half { Precision::Half } else { Precision::Single },
+        report: Some(&args.report),
     };
     if args.whitening {
         let Finetuning { augmentations, seed, .. } = settings;
-        adaptation.whiten(&Whitening { augmentations, seed, ..Whitening::default() })?;
+        let prior = args.prior;
+        adaptation.whiten(&Whitening { augmentations, seed, prior, ..Whitening::default() })?;
     } else {
         adaptation.finetune(&settings)?;
     }

@@ -4,19 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use rsf::{
-    MiningParams, Preset,
-    net::{Material, Trial, default_network},
+    Preset,
+    net::{Material, default_network},
     study::{gap, references},
 };
-use vpr_report::cli::{self, Bar, Outcome};
+use vpr_report::cli::{self, Bar, Outcome, ReportArgs};
 use vpr_study::Sources;
 
-use super::map::MapArgs;
-
-/// References of the map that are looked up under augmentations, at most.
-const TRIED: usize = 200;
-/// Variants of each.
-const VARIANTS: usize = 2;
+use super::{map::MapArgs, report};
 
 /// A map, weights, and what they were trained on.
 #[derive(clap::Args)]
@@ -36,9 +31,12 @@ pub(crate) struct GapArgs {
     /// Decides the augmentations
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    #[command(flatten)]
+    report: ReportArgs,
 }
 
 pub(crate) fn run(args: &GapArgs) -> anyhow::Result<Outcome> {
+    args.report.check()?;
     let (set, name) = args.map.open()?;
     let bar = Bar::default();
     let (folders, cache) = (args.map.data.folders(), args.map.data.cache());
@@ -52,15 +50,15 @@ pub(crate) fn run(args: &GapArgs) -> anyhow::Result<Outcome> {
     let apart = gap(&of_map, &of_domain)?;
     cli::print(&format!("map\t{name}\nFréchet distance\t{:.4}\n", apart.frechet))?;
     cli::print(&format!("share of own neighbours\t{:.3}\n", apart.own_neighbours))?;
-    let step = map.len().div_ceil(TRIED).max(1);
-    let rows: Vec<usize> = (0..map.len()).step_by(step).collect();
+    let mut trials = Vec::new();
     for preset in [Preset::Viewpoint, Preset::Appearance, Preset::All] {
-        let mining = MiningParams::default();
-        let trial =
-            Trial::new(&map, &rows, VARIANTS, &preset.augmentations(), (&mining, args.seed))?;
+        let trial = report::trial(&map, preset, args.seed)?;
         let score = trial.score(&network, &of_map)?;
         let (key, recall, n) = (preset.key(), score.recall, score.n);
         cli::print(&format!("R@1 of its own references, {key} changed\t{recall:.3} of {n}\n"))?;
+        trials.push((preset, trial));
     }
+    let title = format!("Gap of {name}");
+    report::write(&args.report, (&title, &set, &map), &trials, &[("default network", &network)])?;
     Ok(Outcome::Success)
 }

@@ -6,7 +6,7 @@ use std::{
 };
 
 use anyhow::{Context as _, bail, ensure};
-use rsf::study::{Encoder, Place, Study, references};
+use rsf::study::{Encoder, Place, Study};
 use vpr_nets::weights::Precision;
 use vpr_report::{
     cli::{self, Bar, DataArgs, Outcome},
@@ -46,10 +46,7 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<Outcome> {
     for path in &args.experiment {
         let experiment = experiment::load::<Study>(path)?;
         ensure!(experiment.chapter == CHAPTER, "{}: not of this chapter", path.display());
-        let (places, encoders) = match &experiment.study {
-            Study::Recalls { places, encoders, .. } => (places, encoders),
-            Study::Gaps { .. } => continue,
-        };
+        let Study::Recalls { places, encoders, .. } = &experiment.study else { continue };
         let Some(place) = places.iter().find(|it| it.key == args.place) else { continue };
         for encoder in encoders {
             let Some(output) = of_place(encoder, place).filter(|it| it.contains(&args.only)) else {
@@ -81,7 +78,7 @@ fn adapt(
     output: &Path,
     sources: &Sources<'_>,
 ) -> anyhow::Result<()> {
-    let Some(set) = references(sources, &place.dataset)? else {
+    let Some(set) = place.references(sources)? else {
         bail!(sources.why_absent(&place.dataset, "images")?)
     };
     let set = if encoder.without_poses { set.without_poses() } else { set };
@@ -92,6 +89,7 @@ fn adapt(
         output,
         checkpoints: None,
         precision: Precision::Half,
+        report: None,
     };
     cli::note(&format!("{} on {}", encoder.name, place.name));
     match (&encoder.tuned, &encoder.whitened) {

@@ -16,4 +16,6 @@ pub use lessons::{Lessons, TripletBatch};
 pub use material::{Material, default_network};
 pub use student::Student;
 pub use trial::{Score, Trial};
-pub use whitening::{Whitening, whiten};
+#[cfg(feature = "study")]
+pub(crate) use whitening::features;
+pub use whitening::{Whitening, projected, whiten};

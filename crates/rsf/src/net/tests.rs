@@ -191,7 +191,7 @@ fn a_small_map_is_whitened_with_as_many_directions_as_it_has() {
     let set = map(folder.path(), 5, false);
     let material = Material::open(&set).unwrap();
     let (start, _) = default_network(None).unwrap();
-    let fitted = whiten(&Whitening::default(), start.clone(), &material).unwrap();
+    let fitted = whiten(&Whitening::PUBLISHED, start.clone(), &material).unwrap();
     let rows = material.describe(&fitted).unwrap();
     assert_eq!(rows.dim(), start.dimension());
     let used = |row: usize| rows.row(row).iter().filter(|it| **it != 0.0).count();
@@ -201,7 +201,29 @@ fn a_small_map_is_whitened_with_as_many_directions_as_it_has() {
     // The trunk is what it was, and the same numbers come out again.
     let after = weights(&fitted);
     assert_eq!(moved(&weights(&start), &after), ["head.bias", "head.weight"]);
-    let again = whiten(&Whitening::default(), start.clone(), &material).unwrap();
+    let again = whiten(&Whitening::PUBLISHED, start.clone(), &material).unwrap();
     assert_eq!(weights(&again), after);
     assert!(whiten(&Whitening { variants: 0, ..Whitening::default() }, start, &material).is_err());
+}
+
+#[test]
+fn with_a_prior_cosines_are_those_of_both_projections_mixed() {
+    let folder = tempfile::tempdir().unwrap();
+    let material = Material::open(&map(folder.path(), 6, false)).unwrap();
+    let (start, _) = default_network(None).unwrap();
+    let network = |settings: &Whitening| whiten(settings, start.clone(), &material).unwrap();
+    let moved_by = |prior: f64| {
+        let fitted = network(&Whitening { prior, ..Whitening::default() });
+        let [before, after] = [&start, &fitted].map(|it| material.describe(it).unwrap());
+        assert_eq!(before.dim(), after.dim());
+        let cosine = |rows: &vpr_core::Descriptors, other: usize| rows.row(0).dot(&rows.row(other));
+        (1..6).map(|it| (cosine(&before, it) - cosine(&after, it)).abs()).fold(0.0, f32::max)
+    };
+    // Nearly all of the old projection leaves the cosines; none of it does not.
+    let (all, half, none) = (moved_by(0.999_999), moved_by(0.5), moved_by(0.0));
+    assert!(all < 2e-3 && all < half && half < none, "{all} {half} {none}");
+    let settings = Whitening { prior: 1.0, ..Whitening::default() };
+    assert!(settings.check().unwrap_err().to_string().contains("prior"));
+    let settings = Whitening { ridge: f64::NAN, ..Whitening::default() };
+    assert!(settings.check().unwrap_err().to_string().contains("ridge"));
 }

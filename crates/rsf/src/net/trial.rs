@@ -66,6 +66,32 @@ impl Trial {
         Ok(Self { of, images, correct })
     }
 
+    /// The reference that each variant shows.
+    #[must_use]
+    pub fn of(&self) -> &[usize] {
+        &self.of
+    }
+
+    /// References of the same place, for each variant, in rising order.
+    #[must_use]
+    pub fn correct(&self) -> &[Vec<usize>] {
+        &self.correct
+    }
+
+    /// Descriptors of the variants.
+    ///
+    /// # Errors
+    ///
+    /// [`vpr_core::Error::NotFinite`] if the network gives numbers that are none.
+    pub fn describe(&self, network: &DefaultEncoder) -> Result<Descriptors> {
+        let each = 3 * INPUT.0 * INPUT.1;
+        let mut values = Vec::new();
+        for part in self.images.chunks(each * BATCH) {
+            values.extend_from_slice(network.describe(part, INPUT, BATCH)?.as_slice());
+        }
+        descriptors(values, self.of.len())
+    }
+
     /// Judges a network, given its descriptors of all references.
     ///
     /// # Errors
@@ -73,12 +99,7 @@ impl Trial {
     /// [`vpr_core::Error::NotFinite`] if it gives numbers that are none.
     pub fn score(&self, network: &DefaultEncoder, references: &Descriptors) -> Result<Score> {
         let n = self.of.len();
-        let each = 3 * INPUT.0 * INPUT.1;
-        let mut values = Vec::new();
-        for part in self.images.chunks(each * BATCH) {
-            values.extend_from_slice(network.describe(part, INPUT, BATCH)?.as_slice());
-        }
-        let rows = descriptors(values, n)?;
+        let rows = self.describe(network)?;
         let (mut hits, mut sum, mut n_compared) = (0_usize, 0.0, 0_usize);
         for (query, correct) in self.correct.iter().enumerate() {
             let row = rows.row(query);

@@ -54,12 +54,14 @@ pub(super) fn run(
     let domain = describe(&domain.references, "training domain")?;
     for place in places {
         let columns = ["Queries", "Refs.", "Fréchet distance", "own neighbours"];
-        let Some(dataset) = sources.images(&place.dataset)? else {
-            let why = sources.why_absent(&place.dataset, "images")?;
-            for column in columns {
-                table.push(Cell::absent(&place.name, column, &why));
+        let dataset = match place.open(sources)? {
+            Ok(dataset) => dataset,
+            Err(why) => {
+                for column in columns {
+                    table.push(Cell::absent(&place.name, column, &why));
+                }
+                continue;
             }
-            continue;
         };
         let rows = describe(&dataset.references, &dataset.name)?;
         let gap = gap(&rows, &domain)?;

@@ -1,19 +1,23 @@
 //! What an experiment file of chapter 4 can ask for, one file per study.
 
+mod adapted;
+mod embedding;
+mod gallery;
 mod gaps;
+mod place;
+mod prediction;
 mod recalls;
-
-use std::path::PathBuf;
 
 use serde::Deserialize;
 use vpr_report::{experiment::Experiment, page::Report};
 use vpr_study::Sources;
-use vpr_worlds::{Side, World, is_world, named_recipe};
 
+pub use adapted::Adapted;
 pub use gaps::{Gap, gap};
+pub use place::{Laps, Place, references};
 
 use crate::{
-    ReferenceSet, Result,
+    Result,
     net::{Finetuning, Whitening},
 };
 
@@ -30,6 +34,32 @@ pub enum Study {
         /// Which N; a column for each, named so if there are several.
         ranks: Vec<usize>,
     },
+    /// What held-out references say of an adaptation before a query is seen, against what queries say.
+    Prediction {
+        /// Rows.
+        places: Vec<Place>,
+        /// Which network is adapted.
+        encoder: Encoder,
+    },
+    /// References and the training domain as the network sees them, in a plane: figure 4.1.
+    Embedding {
+        /// The generated counterpart of the training set.
+        training: String,
+        /// What else is shown.
+        places: Vec<Place>,
+    },
+    /// A reference of each place under every augmentation: figure 4.3.
+    Augmentations {
+        /// Rows.
+        places: Vec<Place>,
+    },
+    /// Queries that are matched only before or only after an adaptation: figure 4.4.
+    Found {
+        /// Rows.
+        places: Vec<Place>,
+        /// Which network is adapted.
+        encoder: Encoder,
+    },
     /// Sizes of the places, and how far they are from the training domain: table 4.2.
     Gaps {
         /// The generated counterpart of the training set.
@@ -39,49 +69,85 @@ pub enum Study {
     },
 }
 
-/// A dataset under the name that the thesis has for its original.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Place {
-    /// Name in tables.
-    pub name: String,
-    /// The dataset.
-    pub dataset: String,
-    /// What stands for `{place}` in paths of weights.
-    pub key: String,
-    /// What stands for `{foreign}`: the key of another place, whose references are none of this one.
-    #[serde(default)]
-    pub foreign: Option<String>,
-}
-
-/// The default network with some weights.
+/// A network with some weights.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Encoder {
     /// Name in tables.
     pub name: String,
+    /// The network, `default` if nothing is said; others can have a projection only.
+    #[serde(default = "default_network")]
+    pub method: String,
+    /// Name of the row that this one is held against, the first if nothing is said.
+    #[serde(default)]
+    pub against: Option<String>,
+    /// Seeds of the adaptation; the cell is the mean over them, the note says each.
+    #[serde(default)]
+    pub seeds: Vec<u64>,
     /// Its weights, relative to a data folder, `{place}` for the key of the place and `{foreign}` for
-    /// that of another; those that every clone has if there are none.
+    /// that of another; those that every clone has if there are none. Without them, what is
+    /// `tuned` or `whitened` is adapted while the table is made.
     #[serde(default)]
     pub weights: Option<String>,
-    /// How `rsf train` makes them: fine-tuning of the place's references, with these settings.
+    /// How they are made: fine-tuning on the place's references, with these settings.
     #[serde(default)]
     pub tuned: Option<Finetuning>,
-    /// How `rsf train` makes them: another projection.
+    /// How they are made: another projection.
     #[serde(default)]
     pub whitened: Option<Whitening>,
+    /// The projection that fine-tuning begins with, instead of the network's own.
+    #[serde(default)]
+    pub from: Option<Whitening>,
+    /// The place whose references it is adapted to, instead of the one that it is judged on.
+    #[serde(default)]
+    pub on: Option<Place>,
     /// Poses of the references are not told to the fine-tuning.
     #[serde(default)]
     pub without_poses: bool,
 }
 
 impl Encoder {
-    /// Its weights for a place; `None` for those that every clone has.
+    /// Its weights for a place and a seed; `None` for those that every clone has.
     #[must_use]
-    pub fn weights_for(&self, place: &Place) -> Option<String> {
+    pub fn weights_for(&self, place: &Place, seed: Option<u64>) -> Option<String> {
         let foreign = place.foreign.as_deref().unwrap_or("{foreign}");
         let weights = self.weights.as_ref()?;
-        Some(weights.replace("{place}", &place.key).replace("{foreign}", foreign))
+        let seed = seed.map_or_else(|| "{seed}".to_owned(), |it| it.to_string());
+        let named = weights.replace("{place}", &place.key).replace("{foreign}", foreign);
+        Some(named.replace("{seed}", &seed))
+    }
+
+    /// Its projection under a seed, if it has one.
+    #[must_use]
+    pub fn whitening(&self, seed: Option<u64>) -> Option<Whitening> {
+        self.whitened.map(|it| it.seeded(seed))
+    }
+
+    /// Its fine-tuning under a seed, if it has one.
+    #[must_use]
+    pub fn finetuning(&self, seed: Option<u64>) -> Option<Finetuning> {
+        let settings = self.tuned.as_ref()?;
+        Some(Finetuning { seed: seed.unwrap_or(settings.seed), ..settings.clone() })
+    }
+
+    /// The place whose references it is adapted to.
+    #[must_use]
+    pub fn learned_from<'a>(&'a self, place: &'a Place) -> &'a Place {
+        self.on.as_ref().unwrap_or(place)
+    }
+
+    /// The network before it is adapted.
+    #[must_use]
+    pub fn unadapted(&self) -> Self {
+        Self {
+            weights: None,
+            tuned: None,
+            whitened: None,
+            from: None,
+            seeds: Vec::new(),
+            name: format!("{}, before", self.name),
+            ..self.clone()
+        }
     }
 }
 
@@ -92,32 +158,30 @@ impl Encoder {
 /// Wrong files name themselves; missing ones make absent cells.
 pub fn run(experiment: &Experiment<Study>, sources: &Sources<'_>) -> Result<Report> {
     let mut table = experiment.table();
+    let (mut figure, mut sheet) = (None, None);
+    let seed = experiment.seed;
     match &experiment.study {
         Study::Recalls { places, encoders, ranks } => {
             recalls::run(&mut table, places, (encoders, ranks), sources)?;
         }
+        Study::Prediction { places, encoder } => {
+            prediction::run(&mut table, places, encoder, sources)?;
+        }
+        Study::Embedding { training, places } => {
+            figure = embedding::run(&mut table, training, places, sources)?;
+        }
+        Study::Augmentations { places } => {
+            sheet = gallery::augmentations(&mut table, places, seed, sources)?;
+        }
+        Study::Found { places, encoder } => {
+            sheet = gallery::found(&mut table, places, encoder, sources)?;
+        }
         Study::Gaps { training, places } => gaps::run(&mut table, training, places, sources)?,
     }
     experiment.fill_thesis(&mut table);
-    Ok(Report::new(table, None))
+    Ok(Report { sheet, ..Report::new(table, figure) })
 }
 
-/// The references of a dataset with their poses; `None` if its images are not at hand. A generated
-/// world has poses whatever its layout.
-///
-/// # Errors
-///
-/// Data that is there but malformed.
-pub fn references(sources: &Sources<'_>, id: &str) -> Result<Option<ReferenceSet>> {
-    let Some(dataset) = sources.images(id)? else { return Ok(None) };
-    let images: Vec<PathBuf> = dataset.references.clone();
-    let poses = match &dataset.poses {
-        Some((_, references)) => Some(references.clone()),
-        None if is_world(id) => {
-            let world = World::open(&named_recipe(id)?, sources.cache(), &|| {})?;
-            Some(world.poses(Side::References)?)
-        }
-        None => None,
-    };
-    Ok(Some(ReferenceSet::new(images, poses)?))
+fn default_network() -> String {
+    "default".to_owned()
 }
