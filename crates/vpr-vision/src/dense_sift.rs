@@ -152,7 +152,7 @@ impl Scale<'_> {
     /// Where the first bins of descriptors have their centres, along an axis.
     fn starts(&self, len: usize) -> Vec<usize> {
         let reach = (SIDE - 1) * self.bin;
-        (self.first..(len).saturating_sub(reach)).step_by(self.params.step).collect()
+        (self.first..len.saturating_sub(reach)).step_by(self.params.step).collect()
     }
 
     #[expect(clippy::inline_always, reason = "takes the instruction set of the caller")]

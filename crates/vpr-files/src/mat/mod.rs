@@ -113,7 +113,10 @@ impl MatFile {
             b"IM" => false,
             b"MI" => true,
             _ => {
-                return refuse(126, "no mark of the order of bytes, so no `.mat` file of version 5");
+                return refuse(
+                    126,
+                    "no mark of the order of bytes, so no `.mat` file of version 5",
+                );
             }
         };
         let version = if big_endian { header[124] } else { header[125] };

@@ -176,6 +176,7 @@ mod tests {
             found(&plane, [3, 4], Definition::Published),
             [region(0, 1, 0, 2, 1.35), region(1, 2, 1, 2, 2.5), region(2, 3, 3, 4, 3.0)]
         );
+        #[expect(clippy::cast_possible_truncation, reason = "activations are f32")]
         let energy = ((1.5_f64 + f64::from(1.2_f32) + 2.5) / 3.0) as f32;
         assert_eq!(
             found(&plane, [3, 4], Definition::Corrected),

@@ -33,9 +33,12 @@ fn convolutions(weights: Weights, end: usize) -> Weights {
 
 /// Accepts images of one size only.
 fn only(mut ready: Ready, [height, width]: [usize; 2]) -> Ready {
-    ready.accepts = Box::new(move |rows, columns| match [rows, columns] == [height, width] {
-        true => Ok(()),
-        false => Err(format!("takes images of height {height}, width {width} only")),
+    ready.accepts = Box::new(move |rows, columns| {
+        if [rows, columns] == [height, width] {
+            Ok(())
+        } else {
+            Err(format!("takes images of height {height}, width {width} only"))
+        }
     });
     ready
 }
