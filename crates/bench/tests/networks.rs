@@ -63,4 +63,8 @@ fn an_unknown_method_is_refused_by_name() {
         .output()
         .unwrap();
     assert_eq!(output.status.code(), Some(2));
+    let text = String::from_utf8(output.stderr).unwrap();
+    for name in ["sift3", "hog", "cohog", "dense-vlad", "default", "cosplace"] {
+        assert!(text.contains(name), "{name} is not in {text}");
+    }
 }

@@ -171,11 +171,14 @@ mod tests {
     use super::*;
     use crate::{regression::narrow, sequences};
 
+    const DIM: usize = 12;
+
     /// Descriptors that say where on a line they were taken.
     fn pairs(n: usize) -> Pairs {
         let at = |row: usize| 0.1 * row as f64;
-        let rows =
-            Array2::from_shape_fn((n, 3), |(row, column)| narrow((at(row) + column as f64).sin()));
+        let rows = Array2::from_shape_fn((n, DIM), |(row, column)| {
+            narrow((at(row) + column as f64).sin())
+        });
         let poses = (0..n).map(|row| Pose::translation(at(row), 0.0, 0.0)).collect();
         let map = Map::new(Descriptors::new(rows).unwrap(), Poses::SixDof(poses)).unwrap();
         Pairs::near(map, &sequences(None, n), (0.5, 10.0), Definition::Corrected).unwrap()
@@ -185,11 +188,11 @@ mod tests {
     fn it_learns_how_far_along_a_line_two_images_are() {
         let folder = tempfile::tempdir().unwrap();
         let settings = Training {
-            steps: 300,
+            steps: 1000,
             batch: 16,
             rate: 5e-3,
-            validated_every: 100,
-            halved_every: 100,
+            validated_every: 200,
+            halved_every: 400,
             ..Training::default()
         };
         // One linear map cannot follow a sine, but knows which way.
@@ -206,7 +209,7 @@ mod tests {
                     .unwrap();
             assert_eq!(network.definition, definition);
             let batch = pairs.batch(0, 20, 1);
-            let rows = |values: &[f32]| Array2::from_shape_vec((20, 3), values.to_vec()).unwrap();
+            let rows = |values: &[f32]| Array2::from_shape_vec((20, DIM), values.to_vec()).unwrap();
             let (anchors, targets) = (rows(&batch.anchors), rows(&batch.targets));
             let found = network.relative(anchors.view(), targets.view()).unwrap();
             let (mut error, mut plain) = (0.0, 0.0);

@@ -89,7 +89,7 @@ fn of_scene(
         let anchors = Anchors::every_and_last(poses, &room.references.sequences, k)?;
         let sparse = selected(all, anchors.rows())?;
         let share = sparse.len() as f64 / all.len() as f64;
-        let name = format!("every {k}th image");
+        let name = format!("one image in {k}");
         let sparse_errors = localize(&sparse, queries)?;
         let note = Some(format!("{} of {} images", sparse.len(), all.len()));
         let estimate = out.errors(&name, &sparse_errors, note)?;
