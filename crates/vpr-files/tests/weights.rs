@@ -1,4 +1,4 @@
-//! Caffe's and MATLAB's files hold what SciPy and OpenCV say; what is cut or damaged is refused.
+//! Caffe's and Matlab's files hold what other readers say; what is cut or damaged is refused.
 
 #![expect(clippy::unwrap_used, reason = "a test may")]
 

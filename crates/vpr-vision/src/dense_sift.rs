@@ -1,8 +1,8 @@
-//! SIFT on a dense grid at several scales, as VLFeat's `vl_phow` gives it, and its square root.
+//! SIFT on a dense grid at several scales, as `VLFeat`'s `vl_phow` gives it, and its square root.
 //!
 //! Bosch et al., *Image Classification Using Random Forests and Ferns* (2007), in the fast variant of
-//! VLFeat 0.9.20: orientations of gradients are spread over bins by a triangle, and each bin counts
-//! by the mean of a Gaussian window over it. Angles are exact here, where VLFeat's have a polynomial,
+//! `VLFeat` 0.9.20: orientations of gradients are spread over bins by a triangle, and each bin counts
+//! by the mean of a Gaussian window over it. Angles are exact here, where `VLFeat`'s have a polynomial,
 //! and values keep their fraction, where `vl_phow` rounds them to bytes unless it is told not to.
 //!
 //! Arandjelović and Zisserman, *Three things everyone should know to improve object retrieval* (2012),
@@ -165,13 +165,19 @@ impl Scale<'_> {
         }
         let scale = |values: &mut [f32; DIM]| {
             let length = values.iter().map(|it| it * it).sum::<f32>().sqrt().max(f32::MIN_POSITIVE);
-            values.iter_mut().for_each(|it| *it /= length);
+            for it in values {
+                *it /= length;
+            }
         };
         scale(values);
-        values.iter_mut().for_each(|it| *it = it.min(CLIP));
+        for it in values.iter_mut() {
+            *it = it.min(CLIP);
+        }
         if self.root {
             let sum: f32 = values.iter().sum();
-            values.iter_mut().for_each(|it| *it = (*it / sum).sqrt());
+            for it in values.iter_mut() {
+                *it = (*it / sum).sqrt();
+            }
         } else {
             scale(values);
         }

@@ -1,4 +1,4 @@
-//! Dense `RootSIFT`, VLAD, k-means and PCA are those of NumPy, SciPy and scikit-learn.
+//! Dense `RootSIFT`, VLAD, k-means and PCA are those of `NumPy`, `SciPy` and scikit-learn.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 

@@ -301,6 +301,21 @@ fn write_pair_seeds(folder: &Path, seed: &dyn Fn(&str, &str, &Path)) {
     seed("hloc-pairs", "sound", &folder.join("pairs"));
 }
 
+/// Weights as others write them: the files that other readers were compared with.
+fn write_weight_seeds(seed: &dyn Fn(&str, &str, &Path)) {
+    let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("../vpr-files/tests/golden");
+    for (target, name) in [
+        ("caffemodel", "new.caffemodel"),
+        ("caffemodel", "older.caffemodel"),
+        ("binaryproto", "mean.binaryproto"),
+        ("mat", "compressed.mat"),
+        ("mat", "plain.mat"),
+    ] {
+        let stem = name.split('.').next().unwrap();
+        seed(target, &format!("sound-{stem}"), &weights.join(name));
+    }
+}
+
 /// Writes one sound file of every format, and keeps what is there already.
 pub(crate) fn write_seeds(corpus: &Path) {
     let folder = tempfile::tempdir().unwrap();
@@ -340,17 +355,7 @@ pub(crate) fn write_seeds(corpus: &Path) {
         exchange::write(Format::Colmap, &folder.path().join(file), &six_dof).unwrap();
         seed(target, "sound", &folder.path().join(file));
     }
-    let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("../vpr-files/tests/golden");
-    for (target, name) in [
-        ("caffemodel", "new.caffemodel"),
-        ("caffemodel", "older.caffemodel"),
-        ("binaryproto", "mean.binaryproto"),
-        ("mat", "compressed.mat"),
-        ("mat", "plain.mat"),
-    ] {
-        let stem = name.split('.').next().unwrap();
-        seed(target, &format!("sound-{stem}"), &weights.join(name));
-    }
+    write_weight_seeds(&seed);
     seed("pca", "sound", &pca(folder.path()));
     let place = |name: &str| folder.path().join(name);
     exchange::write(Format::SevenScenes, &place("scene"), &parts(1)).unwrap();

@@ -3,7 +3,7 @@
 use vpr_core::{Definition, Descriptors};
 
 /// Khaliq et al., *A Holistic Visual Place Recognition Approach Using Lightweight CNNs for Significant
-/// ViewPoint and Appearance Changes* (2020), with 400 regions and 256 words, as VPR-Bench runs it.
+/// Viewpoint and Appearance Changes* (2020), with 400 regions and 256 words, as VPR-Bench runs it.
 ///
 /// Regions are 8-connected positions of one channel, ordered by their mean activation; each is
 /// described by the sum of all channels over its bounding box. Differences to the words are summed,

@@ -106,7 +106,7 @@ pub enum Architecture {
     ApGem,
     /// AlexNet to `conv3`, randomly projected.
     AlexNetConv3,
-    /// CaffeNet to `conv5` under the pyramid of VPR-Bench's code: AMOSNet and HybridNet.
+    /// `CaffeNet` to `conv5` under the pyramid of VPR-Bench's code: AMOSNet and HybridNet.
     PyramidPublished,
     /// The same under contiguous pyramids (VB-13).
     PyramidCorrected,

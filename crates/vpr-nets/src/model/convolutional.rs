@@ -173,7 +173,9 @@ pub fn ap_gem(mut weights: Weights, device: &Device) -> Result<Loaded<Parts<ResN
     let mut shift = Vec::with_capacity(to);
     for (row, variance) in components.data.chunks_exact_mut(from).zip(&variance.data) {
         let scale = variance.powf(WHITENING_POWER);
-        row.iter_mut().for_each(|it| *it /= scale);
+        for it in row.iter_mut() {
+            *it /= scale;
+        }
         let dot = |(a, b): (&f32, &f32)| f64::from(*a) * f64::from(*b);
         #[expect(clippy::cast_possible_truncation, reason = "weights are f32")]
         shift.push(-row.iter().zip(&mean.data).map(dot).sum::<f64>() as f32);

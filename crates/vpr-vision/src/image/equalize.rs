@@ -58,7 +58,7 @@ fn equalizing(pixels: &[[u8; 3]]) -> [u8; 256] {
     table
 }
 
-#[expect(clippy::cast_sign_loss, clippy::cast_possible_truncation, reason = "clamped")]
+#[expect(clippy::cast_sign_loss, reason = "clamped")]
 fn byte(value: i32) -> u8 {
     value.clamp(0, 255) as u8
 }

@@ -4,7 +4,7 @@ use std::{borrow::Cow, sync::LazyLock};
 
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
-use vpr_core::{Descriptors, Result};
+use vpr_core::{Descriptors, Error, Result};
 
 use super::{Projection, Vocabulary};
 use crate::{
@@ -54,7 +54,7 @@ impl Local {
     ///
     /// # Errors
     ///
-    /// [`vpr_core::Error::Parameter`] for parameters out of range or an image without pixels.
+    /// [`Error::Parameter`] for parameters out of range or an image without pixels.
     pub fn describe(&self, image: &RgbImage) -> Result<Vec<Descriptors>> {
         match self {
             Self::RootSift { size: [width, height], sift } => {
@@ -71,8 +71,10 @@ impl Local {
                     let values = Hog::new(*params)?.describe(image)?;
                     let block = (params.block / params.cell).pow(2) * params.bins;
                     let shape = (values.len() / block, block);
-                    let rows = Array2::from_shape_vec(shape, values).expect("whole blocks");
-                    Descriptors::new(rows)
+                    let rows = Array2::from_shape_vec(shape, values);
+                    Descriptors::new(
+                        rows.map_err(|err| Error::format("HOG", "blocks", err.to_string()))?,
+                    )
                 };
                 scales.iter().map(blocks).collect()
             }
@@ -97,7 +99,7 @@ impl VladEncoder {
     ///
     /// # Errors
     ///
-    /// [`vpr_core::Error::Mismatch`] if the projection is of another dimension than the vocabulary.
+    /// [`Error::Mismatch`] if the projection is of another dimension than the vocabulary.
     pub fn new(
         local: Local,
         vocabulary: Vocabulary,
@@ -107,7 +109,7 @@ impl VladEncoder {
         match &projection {
             Some(projection) if projection.mean.len() != expected => {
                 let (what, actual) = ("dimension of the projection", projection.mean.len());
-                Err(vpr_core::Error::Mismatch { what, expected, actual })
+                Err(Error::Mismatch { what, expected, actual })
             }
             _ => Ok(Self { local, vocabulary, projection }),
         }

@@ -103,24 +103,23 @@ impl VladEncoder {
             return Err(refuse("words", "there are none".to_owned()));
         }
         let vocabulary = Vocabulary::from_centres(Descriptors::new(rows)?);
-        let projection = match tensors.tensor("projection.components") {
-            Err(_) => None,
-            Ok(_) => {
-                let components = part("projection.components", Dtype::I8, 2)?;
-                let mean = halves(part("projection.mean", Dtype::F16, 1)?.data());
-                let scales = part("projection.scales", Dtype::F32, 1)?;
-                let scales = scales.data().as_chunks().0.iter().copied().map(f32::from_le_bytes);
-                let scales: Vec<f32> = scales.collect();
-                let bytes = components.data().iter().map(|&it| i8::from_le_bytes([it])).collect();
-                if components.shape() != [scales.len(), mean.len()] {
-                    let reason = "means and scales do not belong to them".to_owned();
-                    return Err(refuse("projection.components", reason));
-                }
-                if !mean.iter().chain(&scales).all(|it| it.is_finite()) {
-                    return Err(refuse("projection.mean", "is not finite".to_owned()));
-                }
-                Some(Projection { mean, scales, bytes })
+        let projection = if tensors.tensor("projection.components").is_err() {
+            None
+        } else {
+            let components = part("projection.components", Dtype::I8, 2)?;
+            let mean = halves(part("projection.mean", Dtype::F16, 1)?.data());
+            let scales = part("projection.scales", Dtype::F32, 1)?;
+            let scales = scales.data().as_chunks().0.iter().copied().map(f32::from_le_bytes);
+            let scales: Vec<f32> = scales.collect();
+            let bytes = components.data().iter().map(|&it| i8::from_le_bytes([it])).collect();
+            if components.shape() != [scales.len(), mean.len()] {
+                let reason = "means and scales do not belong to them".to_owned();
+                return Err(refuse("projection.components", reason));
             }
+            if !mean.iter().chain(&scales).all(|it| it.is_finite()) {
+                return Err(refuse("projection.mean", "is not finite".to_owned()));
+            }
+            Some(Projection { mean, scales, bytes })
         };
         Self::new(local, vocabulary, projection).map_err(|err| err.in_file(path))
     }
