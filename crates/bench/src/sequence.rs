@@ -170,10 +170,10 @@ mod tests {
             (4, 1) => 1.5,
             _ => diagonal(query, reference),
         });
-        assert_eq!(scores.best().indices[4], 1);
+        assert_eq!(scores.best().reference[4], 1);
         for window in [Window::Causal, Window::Centred] {
             let along = along_sequences(&scores, &SequenceParams { window, ..PLAIN }).unwrap();
-            assert_eq!(along.best().indices, (0..8).collect::<Vec<_>>(), "{window:?}");
+            assert_eq!(along.best().reference, (0..8).collect::<Vec<_>>(), "{window:?}");
         }
     }
 
