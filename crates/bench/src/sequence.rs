@@ -1,7 +1,7 @@
 //! Sequence matching in the manner of `SeqSLAM`: a query is matched together with its neighbours in
 //! time.
 //!
-//! Milford and Wyeth, *SeqSLAM* (2012): differences are normalised against those of nearby references,
+//! Milford and Wyeth, *`SeqSLAM`* (2012): differences are normalised against those of nearby references,
 //! then averaged along straight lines of several speeds, and the best speed counts. The paper looks
 //! back only, its released code (`OpenSeqSLAM`) to both sides; both exist here by name.
 

@@ -100,14 +100,14 @@ pub fn train(sources: &Sources<'_>, plan: &Plan) -> Result<Trained> {
     let params = VocabularyParams { clusters: plan.words, rounds: 25, seed: plan.seed };
     let fitted = Vocabulary::fit(&sampled(sources, plan, &images)?, &params)?;
     // As they are kept: in half precision.
-    let plain = VladEncoder::new(plan.local.clone(), fitted, None)?;
-    let plain = VladEncoder::read("vocabulary".as_ref(), &plain.to_bytes(&[])?)?;
-    let rows = vlads(sources, &plain, &images, "training places")?;
+    let unprojected = VladEncoder::new(plan.local.clone(), fitted, None)?;
+    let unprojected = VladEncoder::read("vocabulary".as_ref(), &unprojected.to_bytes(&[])?)?;
+    let rows = vlads(sources, &unprojected, &images, "training places")?;
     let mut judges = Vec::new();
     for name in VALIDATION {
         let dataset = world(sources, name, plan.seed + 2, plan.places)?;
-        let queries = vlads(sources, &plain, &dataset.queries, name)?;
-        let references = vlads(sources, &plain, &dataset.references, name)?;
+        let queries = vlads(sources, &unprojected, &dataset.queries, name)?;
+        let references = vlads(sources, &unprojected, &dataset.references, name)?;
         judges.push((dataset, queries, references));
     }
     let mut trials = Vec::new();
@@ -137,7 +137,7 @@ pub fn train(sources: &Sources<'_>, plan: &Plan) -> Result<Trained> {
         trials.push(trial);
     }
     let (_, projection) = best.ok_or(Error::Empty("projections to try"))?;
-    let vocabulary = plain.vocabulary().clone();
+    let vocabulary = unprojected.vocabulary().clone();
     let encoder = VladEncoder::new(plan.local.clone(), vocabulary, projection)?;
     Ok(Trained { encoder, trials, places: VALIDATION.map(str::to_owned).to_vec() })
 }

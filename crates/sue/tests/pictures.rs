@@ -33,8 +33,9 @@ fn world(folder: &Path) {
         for place in 0..N {
             let name = format!("{place}.png");
             names.push(&name);
+            let shift = 31 * u32::try_from(place).unwrap();
             let level = |x: u32, y: u32| {
-                let (x, y) = (x / 7 + 31 * place as u32, y / 7);
+                let (x, y) = (x / 7 + shift, y / 7);
                 (x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(2_246_822_519)).to_le_bytes()[2]
             };
             let image = GrayImage::from_fn(160, 120, |x, y| image::Luma([level(x, y)]));

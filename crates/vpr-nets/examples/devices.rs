@@ -13,9 +13,9 @@ use burn::{
 };
 use vpr_nets::{
     DeviceChoice,
-    backbone::{DinoV2Config, ResNetConfig},
+    backbone::{DinoV2Config, ResNet, ResNetConfig},
     local::XFeatNet,
-    model::default::DefaultEncoderConfig,
+    model::default::{DefaultEncoder, DefaultEncoderConfig},
 };
 
 /// What the issue of devices allows: a share of the largest value.
@@ -44,10 +44,10 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         |height, width| Tensor::<4>::random([1, 3, height, width], Distribution::Default, &cpu);
     let network = DefaultEncoderConfig::new().init(&cpu);
     let input = images(96, 128);
-    row("default network", both(&network, &input, &device, |it, x| it.forward(x)));
+    row("default network", both(&network, &input, &device, DefaultEncoder::forward));
     let network = ResNetConfig::resnet34().init(&cpu);
     let input = images(224, 224);
-    row("ResNet-34", both(&network, &input, &device, |it, x| it.forward(x)));
+    row("ResNet-34", both(&network, &input, &device, ResNet::forward));
     let network = DinoV2Config::small().init(&cpu);
     row("DINOv2, ViT-S", both(&network, &input, &device, |it, x| it.forward(x).patches));
     let network = XFeatNet::new(&cpu);

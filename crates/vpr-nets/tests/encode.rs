@@ -170,6 +170,7 @@ fn preprocessing_is_what_it_says() {
         size: Size::Native,
         interpolation: Interpolation::Bilinear,
         channels: Channels::Rgb,
+        equalize: false,
         scale: 1.0,
         mean: [10.0, 0.0, 0.0],
         std: [2.0, 1.0, 1.0],

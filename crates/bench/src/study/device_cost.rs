@@ -1,10 +1,7 @@
 //! Times of networks on a device besides the processor: table 3.8.
 
 use vpr_core::Result;
-use vpr_report::{
-    figure::Figure,
-    table::{Cell, Table},
-};
+use vpr_report::table::{Cell, Table};
 use vpr_study::{Technique, technique::hand_crafted_names};
 
 use super::Context;
@@ -21,7 +18,7 @@ pub(super) fn run(
     techniques: &[Technique],
     timed_on: &[String],
     context: Context<'_>,
-) -> Result<Option<Figure>> {
+) -> Result<()> {
     let runners = context.sources.runners()?;
     let is_network = |name: &str| hand_crafted_names().all(|it| it != name);
     for technique in techniques {
@@ -32,7 +29,7 @@ pub(super) fn run(
     for runner in runners.iter().filter(|it| is_network(&it.name)) {
         match context.device.filter(|_| context.timings) {
             Some(device) => {
-                measured(table, (&runner.name, runner.column), device, timed_on, context)?
+                measured(table, (&runner.name, runner.column), device, timed_on, context)?;
             }
             None => absent(
                 table,
@@ -41,7 +38,7 @@ pub(super) fn run(
             ),
         }
     }
-    Ok(None)
+    Ok(())
 }
 
 fn absent(table: &mut Table, row: &str, why: &str) {

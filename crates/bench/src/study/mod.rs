@@ -224,6 +224,10 @@ fn panel_of<'a>(figure: &'a mut Figure, title: &str, new: impl FnOnce() -> Panel
     &mut figure.panels[index]
 }
 
+fn no_figure((): ()) -> Option<Figure> {
+    None
+}
+
 /// Computes what the experiment asks for, as far as its data is at hand.
 ///
 /// # Errors
@@ -242,7 +246,7 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
             cost::run(&mut table, timed_on, stored, descriptors, context)?
         }
         Study::DeviceCost { techniques, timed_on } => {
-            device_cost::run(&mut table, techniques, timed_on, context)?
+            device_cost::run(&mut table, techniques, timed_on, context).map(no_figure)?
         }
         Study::DescriptorSize { datasets, cell_sizes, pca_dimensions, max_region_pairs } => {
             let sweep = descriptor_size::Sweep {
@@ -279,12 +283,10 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
             None
         }
         Study::Winners { datasets } => {
-            winners::run(&mut table, datasets, context)?;
-            None
+            winners::run(&mut table, datasets, context).map(no_figure)?
         }
         Study::Overlap { worlds, radii } => {
-            overlap::run(&mut table, worlds, radii, context)?;
-            None
+            overlap::run(&mut table, worlds, radii, context).map(no_figure)?
         }
         Study::Worlds(worlds) => worlds::run(&mut table, worlds, context)?,
         Study::Roc { datasets, curves } => roc::run(&mut table, datasets, *curves, context)?,

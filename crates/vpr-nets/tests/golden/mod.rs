@@ -1,4 +1,5 @@
 //! Outputs of official code: committed ones under `data/golden`, the others beside `VPR_DATA`.
+#![allow(dead_code, reason = "not every test needs all of it")]
 
 use std::path::{Path, PathBuf};
 
