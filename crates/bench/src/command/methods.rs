@@ -22,17 +22,16 @@ pub(crate) struct MethodsArgs {
 
 pub(crate) fn run(args: &MethodsArgs) -> anyhow::Result<Outcome> {
     let roots = args.data.folders();
-    let text = match &args.name {
-        Some(name) => everything(&Method::find(name, None)?, &roots),
-        None => {
-            let mut text = "the ten techniques of the thesis\n".to_owned();
-            for technique in Technique::ALL {
-                text += &of_the_thesis(technique, &roots)?;
-            }
-            text += "\nnetworks\n";
-            text.extend(methods().iter().map(|method| line(method, &roots)));
-            text
+    let text = if let Some(name) = &args.name {
+        everything(&Method::find(name, None)?, &roots)
+    } else {
+        let mut text = "the ten techniques of the thesis\n".to_owned();
+        for technique in Technique::ALL {
+            text += &of_the_thesis(technique, &roots)?;
         }
+        text += "\nnetworks\n";
+        text.extend(methods().iter().map(|method| line(method, &roots)));
+        text
     };
     cli::print(&text)?;
     Ok(Outcome::Success)

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use bench::vocabulary::{Plan, Trained, train};
+use bench::vocabulary::{Plan, Trained, Trial, train};
 use vpr_report::cli::{self, Bar, DataArgs, Outcome};
 use vpr_study::Sources;
 use vpr_vision::{dense_sift::DenseSiftParams, vlad::Local};
@@ -74,12 +74,13 @@ pub(crate) fn run(args: &TrainArgs) -> anyhow::Result<Outcome> {
 
 /// Recall@1 of every projection on every place.
 fn table(trained: &Trained) -> String {
-    let mut text = format!("components,whitened,{},mean\n", trained.places.join(","));
-    for trial in &trained.trials {
+    let head = format!("components,whitened,{},mean", trained.places.join(","));
+    let line = |trial: &Trial| {
         let components = trial.components.map_or("none".to_owned(), |it| it.to_string());
         let recalls: Vec<_> = trial.recalls.iter().map(|it| format!("{it:.4}")).collect();
         let (whiten, mean) = (trial.whiten, trial.mean());
-        text += &format!("{components},{whiten},{},{mean:.4}\n", recalls.join(","));
-    }
-    text
+        format!("{components},{whiten},{},{mean:.4}", recalls.join(","))
+    };
+    let lines: Vec<String> = [head].into_iter().chain(trained.trials.iter().map(line)).collect();
+    lines.join("\n") + "\n"
 }
