@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use vpr_core::{Descriptors, Error, Ranking};
-use vpr_nets::encode::{Encoder, Options, encode_files};
+use vpr_nets::encode::{Encoder, Options, encode_files, registry::Method};
 use vpr_report::cli;
 use vpr_study::technique::{hand_crafted_names, on_request_names};
 
@@ -29,7 +29,7 @@ pub(super) fn retrieve(
     references: Named,
     k: usize,
 ) -> anyhow::Result<Retrieved> {
-    let encoder = asked.encoder.open(asked.method, asked.data).map_err(with_all_names)?;
+    let encoder = asked.encoder.open(asked.method, asked.data)?;
     let options = asked.encoder.options(asked.threads, false);
     let [query_rows, reference_rows] = encode(&*encoder, [&queries, &references], &options)?;
     let alone = if encoder.batch_dependent() && options.batch_size > 1 {
@@ -48,16 +48,21 @@ pub(super) fn retrieve(
     Ok(Retrieved { alone, ..retrieved })
 }
 
+/// Before the work: whether there is such a network.
+pub(super) fn check(method: &str, encoder: &EncoderArgs) -> anyhow::Result<()> {
+    let found = Method::find(method, encoder.backbone.as_deref());
+    found.map(drop).map_err(with_all_names)
+}
+
 /// Who asks for a method that there is not is told of those without a network too.
-fn with_all_names(err: anyhow::Error) -> anyhow::Error {
+fn with_all_names(err: vpr_nets::Error) -> anyhow::Error {
     let kind = "method";
-    match err.downcast::<vpr_nets::Error>() {
-        Ok(vpr_nets::Error::Core(Error::Unknown { kind: "method", name, known })) => {
+    match err {
+        vpr_nets::Error::Core(Error::Unknown { kind: "method", name, known }) => {
             let others: Vec<&str> = hand_crafted_names().chain(on_request_names()).collect();
             Error::Unknown { kind, name, known: format!("{}, {known}", others.join(", ")) }.into()
         }
-        Ok(other) => other.into(),
-        Err(other) => other,
+        other => other.into(),
     }
 }
 

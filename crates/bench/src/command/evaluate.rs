@@ -55,7 +55,8 @@ pub(crate) fn run(args: &EvaluateArgs) -> anyhow::Result<Outcome> {
     ensure!(args.recall_values.iter().all(|&n| n > 0), "`recall-values` 0: recall@0 is no metric");
     let largest = args.recall_values.iter().copied().max().unwrap_or(1);
     let k = largest.max(args.num_preds_to_save).max(args.second_stage.rerank.unwrap_or(0));
-    // What can be wrong is found before the work: the truth, and where results are saved.
+    // What can be wrong is found before the work: the method, the truth, and where results are saved.
+    args.input.check_method(&args.method)?;
     let input = Input::open(&args.input)?;
     let source = args.input.truth.source();
     let truth = if args.input.no_labels {

@@ -118,6 +118,17 @@ impl InputArgs {
         !self.no_labels && self.truth.source().is_none()
     }
 
+    /// Before the work: whether images, if that is what is given, can be described by this method.
+    pub(super) fn check_method(&self, method: &str) -> anyhow::Result<()> {
+        if !self.has_images() || hand_crafted(method).is_some() {
+            return Ok(());
+        }
+        #[cfg(feature = "networks")]
+        return by_network::check(method, &self.encoder);
+        #[cfg(not(feature = "networks"))]
+        Err(without_networks(method))
+    }
+
     /// Describes and matches two sets of images by the method asked for.
     pub(super) fn match_images(
         &self,
@@ -139,10 +150,7 @@ impl InputArgs {
                 return by_network::retrieve(&asked, queries, references, k);
             }
             #[cfg(not(feature = "networks"))]
-            anyhow::bail!(
-                "`{method}` is no technique without a network, and this program was built without \
-                 networks: add `--features vpr-bench/networks` to cargo's flags"
-            );
+            return Err(without_networks(method));
         };
         let bar = Bar::default();
         bar.start("images", queries.len() + references.len());
@@ -158,4 +166,12 @@ impl InputArgs {
             ..Retrieved::of_scores([queries, references], matched.similarities, k)?
         })
     }
+}
+
+#[cfg(not(feature = "networks"))]
+fn without_networks(method: &str) -> anyhow::Error {
+    anyhow::anyhow!(
+        "`{method}` is no technique without a network, and this program was built without \
+         networks: add `--features vpr-bench/networks` to cargo's flags"
+    )
 }

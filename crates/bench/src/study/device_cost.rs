@@ -23,7 +23,11 @@ pub(super) fn run(
     let is_network = |name: &str| hand_crafted_names().all(|it| it != name);
     for technique in techniques {
         if runners.iter().all(|it| it.column != technique.name()) {
-            absent(table, technique.name(), "its weights are not at hand, or it does not run here");
+            absent(
+                table,
+                technique.name(),
+                "its weights are not at hand; `bench methods` says where they are from",
+            );
         }
     }
     for runner in runners.iter().filter(|it| is_network(&it.name)) {
