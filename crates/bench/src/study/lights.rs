@@ -1,8 +1,8 @@
-//! The 19 lights of the Point Features dataset: table 3.4.
+//! The 19 lights of the Point Features dataset: table 3.4, figure 3.6.
 
 use vpr_core::{Definition, Provenance};
 use vpr_report::{
-    figure::Figure,
+    figure::{Curve, Figure, Panel, Shape},
     table::{Cell, Table},
 };
 
@@ -49,9 +49,45 @@ pub(super) fn run(table: &mut Table) -> Option<Figure> {
     None
 }
 
+/// Where the lights are seen from above, at unit length: table 3.4 has no distances.
+pub(super) fn from_above(table: &mut Table) -> Figure {
+    let note = "of unit length, from the angles of table 3.4 (corrected names)";
+    let mut points = Vec::new();
+    for (led, (azimuth, elevation)) in (1..).zip(LIGHTS) {
+        let (sin, cos) = f64::to_radians(azimuth).sin_cos();
+        let across = f64::to_radians(elevation).cos();
+        points.push((across * cos, across * sin));
+        for (column, value) in [("x", across * cos), ("y", across * sin)] {
+            let row = format!("LED {led}");
+            table.push(Cell::new(row, column, value, Provenance::Published, 1).noted(note));
+        }
+    }
+    let curve = Curve::new("LED", points).of(Provenance::Published).shaped(Shape::Points);
+    let panel = Panel {
+        title: "from above".into(),
+        x_label: "x, of unit length".into(),
+        y_label: "y, of unit length".into(),
+        curves: vec![curve],
+        ..Panel::default()
+    };
+    Figure { panels: vec![panel] }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lights_lie_in_the_unit_circle_and_the_lowest_farthest_out() {
+        let mut table = Table::new("figure-3.6", "lights");
+        let figure = from_above(&mut table);
+        let far: Vec<f64> =
+            figure.panels[0].curves[0].points.iter().map(|(x, y)| x.hypot(*y)).collect();
+        assert!(far.iter().all(|&it| it < 1.0));
+        let farthest = (0..19).max_by(|&a, &b| far[a].total_cmp(&far[b])).unwrap();
+        let lowest = (0..19).min_by(|&a, &b| LIGHTS[a].1.total_cmp(&LIGHTS[b].1)).unwrap();
+        assert_eq!((far.len(), farthest), (19, lowest));
+    }
 
     #[test]
     fn elevations_are_above_the_table() {

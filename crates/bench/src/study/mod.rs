@@ -1,6 +1,7 @@
 //! What an experiment file of chapter 3 can ask for, one file per study.
 
 mod auc_pr;
+mod chronology;
 mod cost;
 mod datasets;
 mod descriptor_size;
@@ -33,6 +34,7 @@ use vpr_report::{
     page::Report,
 };
 
+pub use chronology::Published;
 pub use invariance::Stage;
 pub use platform_speed::TechniqueTiming;
 pub use sheets::Scene;
@@ -149,6 +151,15 @@ pub enum Study {
         /// Datasets, by id.
         datasets: Vec<String>,
     },
+    /// Where the lights of the Point Features dataset are: figure 3.6.
+    LightsFromAbove,
+    /// Precision at 100 % recall over the years of techniques: figure 3.2.
+    Chronology {
+        /// Datasets, by id.
+        datasets: Vec<String>,
+        /// Techniques in the order of their years.
+        order: Vec<Published>,
+    },
     /// Times of networks on a device besides the processor: table 3.8.
     DeviceCost {
         /// Techniques that the thesis timed.
@@ -241,6 +252,10 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         Study::Tolerances { datasets } => tolerances::run(&mut table, datasets, context)?,
         Study::Metrics => metrics::run(&mut table),
         Study::Lights => lights::run(&mut table),
+        Study::LightsFromAbove => Some(lights::from_above(&mut table)),
+        Study::Chronology { datasets, order } => {
+            chronology::run(&mut table, datasets, order, context)?
+        }
         Study::AucPr { datasets } => auc_pr::run(&mut table, datasets, context)?,
         Study::Cost { timed_on, stored, descriptors } => {
             cost::run(&mut table, timed_on, stored, descriptors, context)?
@@ -249,11 +264,8 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
             device_cost::run(&mut table, techniques, timed_on, context).map(no_figure)?
         }
         Study::DescriptorSize { datasets, cell_sizes, pca_dimensions, max_region_pairs } => {
-            let sweep = descriptor_size::Sweep {
-                cell_sizes,
-                pca_dimensions,
-                max_region_pairs: *max_region_pairs,
-            };
+            let max_region_pairs = *max_region_pairs;
+            let sweep = descriptor_size::Sweep { cell_sizes, pca_dimensions, max_region_pairs };
             descriptor_size::run(&mut table, datasets, sweep, context)?
         }
         Study::PrCurves { datasets } => pr_curves::run(&mut table, datasets, context)?,
@@ -264,11 +276,8 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
             range::run(&mut table, datasets, tolerances, context)?
         }
         Study::PlatformSpeed { timings, map_sizes, frames_per_metre, max_speed, timed_on } => {
-            let platform = platform_speed::Drive {
-                map_sizes,
-                frames_per_metre: *frames_per_metre,
-                max_speed: *max_speed,
-            };
+            let (frames_per_metre, max_speed) = (*frames_per_metre, *max_speed);
+            let platform = platform_speed::Drive { map_sizes, frames_per_metre, max_speed };
             platform_speed::run(&mut table, timings, platform, timed_on, context)?
         }
         Study::Invariance { stored, series, stages } => {
