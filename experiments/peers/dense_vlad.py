@@ -78,7 +78,7 @@ def describe(image, words):
 
 
 def build():
-    command = ["cargo", "build", "--quiet", "--package", "vpr-vision", "--example", "dense_vlad_time"]
+    command = ["cargo", "build", "--quiet", "--example", "dense_vlad_time"]
     subprocess.run(command, cwd=ROOT, check=True)
     return Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "debug/examples/dense_vlad_time"
 

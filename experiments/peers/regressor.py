@@ -34,7 +34,7 @@ DIM, POSE, IMAGES = 512, 7, 1000
 
 def build() -> Path:
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-    command = ["cargo", "build", "--quiet", "--package", "vpr-copr", "--example", "regressor_time"]
+    command = ["cargo", "build", "--quiet", "--example", "regressor_time"]
     subprocess.run(command, cwd=ROOT, check=True)
     return target / "debug/examples/regressor_time"
 
