@@ -3,10 +3,10 @@
 use burn::config::Config;
 use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
-use burn::tensor::activation::gelu;
 use burn::tensor::{Device, Tensor};
 
 use crate::Result;
+use crate::layer::{dense, dense_gelu};
 use crate::weights::Shapes;
 use crate::weights::Weights;
 
@@ -82,7 +82,7 @@ impl DescriptorRegressor {
     pub fn forward(&self, anchor: Tensor<2>, relative_pose: Tensor<2>) -> Tensor<2> {
         let x = Tensor::cat(vec![anchor, relative_pose], 1);
         let (output, hidden) = self.net_regdesc.split_last().expect("an output layer");
-        let x = hidden.iter().fold(x, |x, layer| gelu(layer.forward(x)));
-        output.forward(x)
+        let x = hidden.iter().fold(x, |x, layer| dense_gelu(layer, x));
+        dense(output, x)
     }
 }

@@ -87,13 +87,14 @@ impl WithSimd for Kernels<'_> {
 }
 
 /// One axis of `G g Gᵀ`: the rows of `G` are (¼, 0, 0), (−⅙, ∓⅙, −⅙), (1/24, ±1/12, ⅙) and
-/// (0, 0, 1).
+/// (0, 0, 1). Products with inverses: divisions took a fifth of a training step.
 #[inline(always)]
 fn kernel_line(a: &Wide, b: &Wide, c: &Wide, line: &mut [Wide; REACH]) {
+    const SIXTH: f64 = 1.0 / 6.0;
     for lane in 0..TILE {
         let (a, b, c) = (a[lane], b[lane], c[lane]);
-        let (even, odd) = ((a + c) / -6.0, b / 6.0);
-        let (even_2, odd_2) = (a / 24.0 + c / 6.0, b / 12.0);
+        let (even, odd) = ((a + c) * -SIXTH, b * SIXTH);
+        let (even_2, odd_2) = (a * (0.25 * SIXTH) + c * SIXTH, b * (0.5 * SIXTH));
         line[0][lane] = 0.25 * a;
         line[1][lane] = even - odd;
         line[2][lane] = even + odd;

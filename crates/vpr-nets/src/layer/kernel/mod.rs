@@ -21,7 +21,7 @@ pub(crate) use finish::Finish;
 use frequencies::Frequencies;
 pub(crate) use geometry::Geometry;
 use multiply::Packed;
-pub(crate) use product::product;
+pub(crate) use product::{product, product_by_columns, product_by_rows};
 pub(crate) use weights_gradient::weights_gradient;
 
 /// Weights of one group of a convolution, packed when first needed.
@@ -161,6 +161,14 @@ mod tests {
             let (rows, matrix) = (noise(n * depth, seed), noise(depth * width, seed + 1));
             let fast = product(&rows, &matrix, depth);
             prop_assert_eq!(fast.len(), n * width);
+            let transposed = |matrix: &[f32], width: usize| -> Vec<f32> {
+                let columns = (0..width).map(|at| matrix.iter().skip(at).step_by(width));
+                columns.flatten().copied().collect()
+            };
+            let by_rows = product_by_rows(&rows, &transposed(&matrix, width), depth);
+            prop_assert_eq!(&by_rows, &fast);
+            let by_columns = product_by_columns(&transposed(&rows, depth), &matrix, depth);
+            prop_assert_eq!(&by_columns, &fast);
             for (index, &fast) in fast.iter().enumerate() {
                 let row = &rows[index / width * depth..][..depth];
                 let column = matrix.iter().skip(index % width).step_by(width);

@@ -55,6 +55,24 @@ impl Packed {
         Self { values, depth }
     }
 
+    /// Packs the columns of a matrix given row by row, as if they were rows; it has `depth` rows.
+    pub(super) fn columns(matrix: &[f32], depth: usize) -> Self {
+        let n_columns = matrix.len() / depth.max(1);
+        let mut values = vec![[0.0; TILE]; n_columns.div_ceil(TILE) * depth];
+        values.par_chunks_exact_mut(depth.max(1)).enumerate().for_each(|(group, values)| {
+            let first = group * TILE;
+            let n = TILE.min(n_columns - first);
+            for (lanes, row) in values.iter_mut().zip(matrix.chunks_exact(n_columns)) {
+                let row = &row[first..first + n];
+                match <&Lanes>::try_from(row) {
+                    Ok(whole) => *lanes = *whole,
+                    Err(_) => lanes[..n].copy_from_slice(row),
+                }
+            }
+        });
+        Self { values, depth }
+    }
+
     /// Number of terms in each sum.
     pub(super) fn depth(&self) -> usize {
         self.depth

@@ -1,4 +1,4 @@
-//! Rows times a matrix: the linear layers of a transformer.
+//! Rows times a matrix: the linear layers of a transformer and their gradients.
 //!
 //! The rows are packed, the matrix is copied a strip of columns and a block of depth at a time. So
 //! each of its values is read from memory once, and nothing is kept from call to call.
@@ -19,19 +19,27 @@ const PANELS: usize = 4;
 ///
 /// Terms are added in the order of the depth.
 pub(crate) fn product(rows: &[f32], matrix: &[f32], depth: usize) -> Vec<f32> {
-    let (n_rows, width) = (rows.len() / depth, matrix.len() / depth);
-    let packed = Packed::new(rows, depth);
+    let width = matrix.len() / depth;
+    multiplied(&Packed::new(rows, depth), rows.len() / depth, Right::Columns { matrix, width })
+}
+
+/// Rows of `depth` values times the transposed of a matrix whose rows have `depth` values too.
+pub(crate) fn product_by_rows(rows: &[f32], matrix: &[f32], depth: usize) -> Vec<f32> {
+    multiplied(&Packed::new(rows, depth), rows.len() / depth, Right::Rows { matrix, depth })
+}
+
+/// The transposed of a matrix times another of as many rows, `depth`.
+pub(crate) fn product_by_columns(left: &[f32], matrix: &[f32], depth: usize) -> Vec<f32> {
+    let (n_rows, width) = (left.len() / depth, matrix.len() / depth);
+    multiplied(&Packed::columns(left, depth), n_rows, Right::Columns { matrix, width })
+}
+
+fn multiplied(rows: &Packed, n_rows: usize, right: Right<'_>) -> Vec<f32> {
+    let width = right.width();
     let n_panels = width.div_ceil(TILE);
     let strips = (0..n_panels).into_par_iter().step_by(PANELS).map(|first| {
         let n_panels = PANELS.min(n_panels - first);
-        dispatch(Strip {
-            rows: &packed,
-            n_groups: n_rows.div_ceil(TILE),
-            matrix,
-            width,
-            first,
-            n_panels,
-        })
+        dispatch(Strip { rows, n_groups: n_rows.div_ceil(TILE), right, first, n_panels })
     });
     let strips: Vec<Vec<Tile>> = strips.collect();
     let mut values = vec![0.0; n_rows * width];
@@ -41,7 +49,7 @@ pub(crate) fn product(rows: &[f32], matrix: &[f32], depth: usize) -> Vec<f32> {
                 let n_panels = values.len().div_ceil(TILE);
                 let tiles = &strip[group * n_panels..][..n_panels];
                 for (tile, values) in tiles.iter().zip(values.chunks_mut(TILE)) {
-                    values.copy_from_slice(&tile[row][..values.len()]);
+                    drain(&tile[row], values);
                 }
             }
         }
@@ -49,13 +57,30 @@ pub(crate) fn product(rows: &[f32], matrix: &[f32], depth: usize) -> Vec<f32> {
     values
 }
 
+/// The right factor.
+#[derive(Clone, Copy)]
+enum Right<'a> {
+    /// A matrix whose columns are multiplied with.
+    Columns { matrix: &'a [f32], width: usize },
+    /// A matrix whose rows are.
+    Rows { matrix: &'a [f32], depth: usize },
+}
+
+impl Right<'_> {
+    /// Columns of the result.
+    fn width(&self) -> usize {
+        match *self {
+            Self::Columns { width, .. } => width,
+            Self::Rows { matrix, depth } => matrix.len() / depth,
+        }
+    }
+}
+
 /// Some columns of the result.
 struct Strip<'a> {
     rows: &'a Packed,
     n_groups: usize,
-    matrix: &'a [f32],
-    /// Columns of the matrix.
-    width: usize,
+    right: Right<'a>,
     /// First panel.
     first: usize,
     n_panels: usize,
@@ -70,8 +95,10 @@ impl WithSimd for Strip<'_> {
         let depth = self.rows.depth();
         let mut sums = vec![[[0.0; TILE]; TILE]; self.n_groups * self.n_panels];
         let mut panels = vec![[0.0; TILE]; self.n_panels * DEPTH_BLOCK];
-        for start in (0..depth).step_by(DEPTH_BLOCK) {
-            let depths = start..(start + DEPTH_BLOCK).min(depth);
+        // Blocks of about one length: a last one of a few depths would cost as much around its sums.
+        let block = depth.div_ceil(depth.div_ceil(DEPTH_BLOCK).max(1));
+        for start in (0..depth).step_by(block.max(1)) {
+            let depths = start..(start + block).min(depth);
             self.copy(depths.start, depths.len(), &mut panels);
             for (group, sums) in sums.chunks_exact_mut(self.n_panels).enumerate() {
                 let rows = self.rows.group(group, depths.clone());
@@ -86,15 +113,56 @@ impl WithSimd for Strip<'_> {
 }
 
 impl Strip<'_> {
-    /// Copies `n` rows of the matrix from `start` on into the panels. Lanes behind its last column
+    /// Copies `n` depths of the matrix from `start` on into the panels. Lanes behind its last column
     /// keep their zeros.
     fn copy(&self, start: usize, n: usize, panels: &mut [Lanes]) {
         let first = self.first * TILE;
-        let last = (first + self.n_panels * TILE).min(self.width);
-        let rows = self.matrix[start * self.width..].chunks_exact(self.width).take(n);
-        for (depth, row) in rows.enumerate() {
-            for (panel, values) in row[first..last].chunks(TILE).enumerate() {
-                panels[panel * DEPTH_BLOCK + depth][..values.len()].copy_from_slice(values);
+        let last = (first + self.n_panels * TILE).min(self.right.width());
+        match self.right {
+            Right::Columns { matrix, width } => {
+                let rows = matrix[start * width..].chunks_exact(width).take(n);
+                for (depth, row) in rows.enumerate() {
+                    for (panel, values) in row[first..last].chunks(TILE).enumerate() {
+                        fill(&mut panels[panel * DEPTH_BLOCK + depth], values);
+                    }
+                }
+            }
+            Right::Rows { matrix, depth } => {
+                let rows = matrix[first * depth..last * depth].chunks(TILE * depth);
+                for (panel, rows) in panels.chunks_exact_mut(DEPTH_BLOCK).zip(rows) {
+                    transpose(rows, depth, start, &mut panel[..n]);
+                }
+            }
+        }
+    }
+}
+
+/// Copies up to 16 values into lanes; whole ones without a call.
+#[inline(always)]
+fn fill(lanes: &mut Lanes, values: &[f32]) {
+    match <&Lanes>::try_from(values) {
+        Ok(whole) => *lanes = *whole,
+        Err(_) => lanes[..values.len()].copy_from_slice(values),
+    }
+}
+
+/// Copies as many lanes as there are values.
+#[inline(always)]
+fn drain(lanes: &Lanes, values: &mut [f32]) {
+    match <&mut Lanes>::try_from(&mut *values) {
+        Ok(whole) => *whole = *lanes,
+        Err(_) => values.copy_from_slice(&lanes[..values.len()]),
+    }
+}
+
+/// Rows of `depth` values, up to 16, as lanes from the depth `start` on; 16 depths at a time, so that
+/// every line of the cache is read once.
+fn transpose(rows: &[f32], depth: usize, start: usize, lanes: &mut [Lanes]) {
+    for (block, lanes) in lanes.chunks_mut(TILE).enumerate() {
+        for (row, values) in rows.chunks_exact(depth).enumerate() {
+            let values = &values[start + block * TILE..][..lanes.len()];
+            for (lanes, &value) in lanes.iter_mut().zip(values) {
+                lanes[row] = value;
             }
         }
     }

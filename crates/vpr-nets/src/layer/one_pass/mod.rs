@@ -15,9 +15,9 @@ mod moments;
 mod norm;
 mod rows;
 
-pub(crate) use gelu::gelu;
+pub(crate) use gelu::{gelu, gelu_gradient};
 pub(crate) use moments::{Moments, Sets, Sharing};
-pub(crate) use norm::{Affine, add_scaled_in_place, layer_norm};
+pub(crate) use norm::{Affine, add_row, add_scaled_in_place, layer_norm};
 pub(crate) use rows::{affine_map, standardize, unit};
 
 use pulp::Arch;

@@ -51,3 +51,17 @@ pub(crate) fn add_scaled_in_place(x: &mut [f32], y: &[f32], bias: &[f32], scale:
         },
     );
 }
+
+/// `x ← x + row`, rows of `row.len()` values.
+pub(crate) fn add_row(x: &mut [f32], row: &[f32]) {
+    for_rows(
+        x,
+        row.len(),
+        #[inline(always)]
+        |_, rows| {
+            for x in rows.chunks_exact_mut(row.len()) {
+                x.iter_mut().zip(row).for_each(|(x, value)| *x += value);
+            }
+        },
+    );
+}
