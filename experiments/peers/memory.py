@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-CASES = ["import", "vit base", "resnet34 1", "resnet34 8", "train 16"]
+CASES = ["import", "vit base", "resnet34 1", "resnet34 8", "train 16", "finetune 16"]
 
 
 def peer(case):
@@ -30,10 +30,11 @@ def peer(case):
 
         run = int
     else:
-        from convolution import resnet34, training_step
+        from convolution import finetuning_step, resnet34, training_step
 
-        run = {"resnet34": resnet34, "train": training_step}[name](int(number))
-    with torch.inference_mode(name != "train"):
+        cases = {"resnet34": resnet34, "train": training_step, "finetune": finetuning_step}
+        run = cases[name](int(number))
+    with torch.inference_mode(name not in ("train", "finetune")):
         for _ in range(3):
             run()
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)

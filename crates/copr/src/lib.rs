@@ -52,8 +52,8 @@ pub use localize::{
     world_offset,
 };
 pub use regression::{
-    Control, Controlled, GaussianParams, GaussianProcess, LinearInterpolation, Outside, PlaneFit,
-    PlaneParams, Regressor, Told,
+    Blended, Control, Controlled, GaussianParams, GaussianProcess, LinearInterpolation, Outside,
+    PlaneFit, PlaneParams, Regressor, Told,
 };
 pub use targets::{Frame, Grid, MOST_TARGETS, Target, Targets};
 

@@ -2,7 +2,8 @@
 //! and runs PyTorch in between. Answers with nanoseconds.
 //!
 //! Cases: `layer images in out side kernel stride`, `resnet34 images`, `train images` (one step of
-//! Adam on ResNet-18 with ten classes at 96×96).
+//! Adam on ResNet-18 with ten classes at 96×96), `finetune triplets` (one step of Adam on the default
+//! network under the triplet loss, three images of 128×96 each).
 #![expect(clippy::print_stdout, reason = "prints its measurements")]
 
 use std::{collections::HashMap, io::BufRead, time::Instant};
@@ -16,6 +17,8 @@ use burn::{
 use vpr_nets::{
     backbone::{ResNetConfig, resnet::Block},
     layer::Conv2dConfig,
+    loss::Triplet,
+    model::default::{DefaultEncoderConfig, INPUT},
     train::Optimizer,
 };
 
@@ -50,6 +53,7 @@ fn case(line: &str) -> Result<Case, String> {
         }
         ("resnet34", &[images]) => Ok(resnet34(images)),
         ("train", &[images]) => Ok(training_step(images)),
+        ("finetune", &[triplets]) => Ok(fine_tuning_step(triplets)),
         _ => Err(format!("no case `{line}`")),
     }
 }
@@ -91,5 +95,20 @@ fn training_step(images: usize) -> Case {
         let gradients = loss.forward(scores, classes.clone()).backward();
         let gradients = GradientsParams::from_grads(gradients, &current);
         network = Some(adam.step(1e-3, current, gradients));
+    })
+}
+
+fn fine_tuning_step(triplets: usize) -> Case {
+    let device = Device::flex().autodiff();
+    let mut network = Some(DefaultEncoderConfig::new().init(&device));
+    let mut adam = Optimizer::Adam.init();
+    let input = noise([3 * triplets, 3, INPUT.1, INPUT.0], &device);
+    Box::new(move || {
+        let Some(current) = network.take() else { return };
+        let rows = current.forward(input.clone());
+        let part = |number: usize| rows.clone().narrow(0, number * triplets, triplets);
+        let loss = Triplet { margin: 0.3 }.forward(part(0), part(1), part(2));
+        let gradients = GradientsParams::from_grads(loss.backward(), &current);
+        network = Some(adam.step(3e-4, current, gradients));
     })
 }

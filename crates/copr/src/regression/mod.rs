@@ -1,5 +1,6 @@
 //! Descriptors at poses that no camera visited, one file per strategy.
 
+mod blended;
 mod control;
 mod gaussian;
 mod linear;
@@ -8,6 +9,7 @@ mod plane;
 use rayon::prelude::*;
 use vpr_core::Pose;
 
+pub use blended::Blended;
 pub use control::{Control, Controlled};
 pub use gaussian::{GaussianParams, GaussianProcess};
 pub use linear::LinearInterpolation;

@@ -8,9 +8,9 @@ use vpr_core::{Definition, Descriptors, Map, retrieve};
 
 use super::Context;
 use crate::{
-    Control, Controlled, Error, GaussianParams, GaussianProcess, LinearInterpolation, MOST_TARGETS,
-    Options, Outside, PlaneFit, PlaneParams, PoseErrors, Regressor, Result, Targets, Told,
-    net::NetworkRegressor, regressed,
+    Blended, Control, Controlled, Error, GaussianParams, GaussianProcess, LinearInterpolation,
+    MOST_TARGETS, Options, Outside, PlaneFit, PlaneParams, PoseErrors, Regressor, Result, Targets,
+    Told, net::NetworkRegressor, regressed,
 };
 
 /// How descriptors are regressed.
@@ -34,6 +34,9 @@ pub enum Method {
         /// Whether to mend the lengths of its descriptors (C-1).
         #[serde(default)]
         renormalise: bool,
+        /// From how many of the nearest anchors; without it from its own alone, as in the thesis.
+        #[serde(default)]
+        anchors: Option<usize>,
     },
     /// A Gaussian process over poses, of many anchors.
     GaussianProcess {},
@@ -46,6 +49,9 @@ pub enum Method {
         weights: Option<PathBuf>,
     },
 }
+
+/// Within it several anchors count about alike, metres: two steps of the grids of table 6.1.
+const NEAR_M: f64 = 0.1;
 
 fn fine() -> f64 {
     PlaneParams::default().tolerance
@@ -74,6 +80,9 @@ impl Method {
             Self::LinearInterpolation => "Lin. Interp.",
             Self::Plane { .. } => "Lin. Reg.",
             Self::GaussianProcess {} => "Gaussian process",
+            Self::Network { anchors: Some(n), .. } => {
+                return format!("dense map, Non-lin. Reg. from {n} anchors");
+            }
             Self::Network { renormalise: false, .. } => "Non-lin. Reg.",
             Self::Network { renormalise: true, .. } => "Non-lin. Reg., unit length",
             Self::Control { control: Control::Random, .. } => "random rows",
@@ -94,8 +103,9 @@ impl Method {
             PathBuf::from(weights.replace("{place}", name).replace("{encoder}", name))
         };
         match self {
-            Self::Network { weights, renormalise } => {
-                Self::Network { weights: of(weights), renormalise: *renormalise }
+            Self::Network { weights, renormalise, anchors } => {
+                let (weights, renormalise, anchors) = (of(weights), *renormalise, *anchors);
+                Self::Network { weights, renormalise, anchors }
             }
             Self::Control { control, weights: Some(weights) } => {
                 Self::Control { control: *control, weights: Some(of(weights)) }
@@ -106,7 +116,7 @@ impl Method {
 
     /// Whether it is H with its own rows, not a control of it.
     pub(super) fn is_network(&self) -> bool {
-        matches!(self, Self::Network { renormalise: false, .. })
+        matches!(self, Self::Network { renormalise: false, anchors: None, .. })
     }
 
     /// Whether it is H with its rows shuffled.
@@ -129,14 +139,18 @@ impl Method {
             Self::GaussianProcess {} => {
                 (Box::new(GaussianProcess::new(GaussianParams::default())?), None)
             }
-            Self::Network { weights, renormalise } => {
+            Self::Network { weights, renormalise, anchors } => {
                 options.renormalise = *renormalise;
                 let network = match network(weights, context)? {
                     Ok(network) => network,
                     Err(why) => return Ok(Err(why)),
                 };
                 let definition = name_of(network.definition());
-                (Box::new(network), Some(definition))
+                let network: Box<dyn Regressor> = match anchors {
+                    Some(n) => Box::new(Blended::new(Box::new(network), *n, NEAR_M)?),
+                    None => Box::new(network),
+                };
+                (network, Some(definition))
             }
             Self::Control { control, weights } => {
                 let of: Box<dyn Regressor> = match weights {

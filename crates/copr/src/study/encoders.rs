@@ -25,7 +25,7 @@ pub(super) fn run(
     for encoder in &rooms.encoders {
         // Where `copr train regressor` puts the weights of this encoder's H.
         let weights = PathBuf::from(format!("models/copr-{encoder}.safetensors"));
-        let network = Method::Network { weights, renormalise: false };
+        let network = Method::Network { weights, renormalise: false, anchors: None };
         columns.extend(["sparse map", "dense map"].map(|map| format!("{encoder}: {map}")));
         for scene in scenes {
             for &paths in &rooms.paths {

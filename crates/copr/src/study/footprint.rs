@@ -11,15 +11,19 @@ use super::{
     dense::{joined, selected},
     encoder,
     lanes::Opened,
+    lesson::{self, Lesson},
 };
 use crate::{Anchors, Grid, Result, Targets, regressed, sequences};
 use vpr_core::Definition;
 
+const TRAIN: &str = "t_train, s";
 const DENSIFY: &str = "t_dense, ms";
 const ENCODE: &str = "t_enc, ms";
 const MATCH: &str = "t_match, ms";
 const RETRIEVE: &str = "t_retr, ms";
 const SIZE: &str = "map size, rows";
+/// Why a time is not there.
+const ON_REQUEST: &str = "measured on request: --timings";
 /// Times of which the median counts.
 const REPEATS: usize = 5;
 /// Images that are timed.
@@ -52,6 +56,16 @@ pub(super) fn run(
         let timed =
             Timed { column, sparse: &sparse, queries: &room.queries.map, targets: &targets };
         timed.push(table, &method.at(encoder), (&runner, images), context)?;
+        let cell = if context.timings {
+            let Lesson { seconds, step, of } = lesson::learn(&room)?;
+            let provenance = Provenance::Generated;
+            let cell = Cell::new(TRAIN, &timed.column, seconds, provenance, room.queries.map.len());
+            let note = format!("H until its best validation, step {step} of {of}, on this machine");
+            cell.noted(note).timing()
+        } else {
+            Cell::absent(TRAIN, &timed.column, ON_REQUEST)
+        };
+        table.push(cell);
     }
     for place in places {
         let column = format!("{}, {}, generated", place.name, place.encoder);
@@ -122,7 +136,7 @@ impl Timed<'_> {
             }
         };
         if !context.timings {
-            absent(table, "measured on request: --timings");
+            absent(table, ON_REQUEST);
             return Ok(());
         }
         let ready = match method.ready(context)? {

@@ -10,6 +10,7 @@ mod fine;
 mod footprint;
 mod interpolation;
 mod lanes;
+mod lesson;
 mod matches;
 mod methods;
 mod place;

@@ -1,8 +1,11 @@
 //! Other ways beside the plain one, on the same queries: H that learned elsewhere, fewer targets.
 
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use serde::Deserialize;
-use vpr_core::{Definition, Map, Provenance};
+use vpr_core::{Definition, Map, Pose, Provenance};
 use vpr_report::table::{Cell, Table};
+use vpr_worlds::{Depth, Side, depths, named_recipe};
 
 use super::{
     Context, Method, Paths, Rooms, Scene,
@@ -14,7 +17,7 @@ use crate::{
     regressed,
     regression::{Anchor, Request},
     sequences,
-    targets::disagreement,
+    targets::{DepthView, behind, disagreement},
 };
 
 /// One way to make a map denser.
@@ -36,6 +39,9 @@ pub struct Variant {
 pub struct Keep {
     /// From 0 to 1.
     pub share: f64,
+    /// Those with more of it get no row, whatever the share.
+    #[serde(default)]
+    pub at_most: Option<f64>,
     /// Those of which there is the least.
     pub least: Doubt,
 }
@@ -50,6 +56,10 @@ pub enum Doubt {
     Variance,
     /// It is outside of the box in which cameras stood: walls are.
     Outside,
+    /// It lies behind what the cameras of the anchors see, by their depth.
+    Behind,
+    /// Nothing: numbers drawn from the experiment's seed, to compare with.
+    Drawn,
 }
 
 /// What is compared.
@@ -115,7 +125,8 @@ fn in_room(
     for variant in std::iter::once(plan.plain).chain(plan.variants) {
         let errors = match variant.method.at(encoder).ready(context)? {
             Ok(ready) => {
-                let targets = variant.chosen((&sparse, &targets), &ready)?;
+                let sources = (&sparse, &targets, room.kept.start);
+                let targets = variant.chosen(sources, &ready, (plan.rooms, scene), context)?;
                 let (rows, _) = regressed(&sparse, &targets, &*ready.regressor, ready.options)?;
                 let errors = localize(&joined(&sparse, &rows)?, queries)?;
                 push(&variant.name, &errors, Some(format!("{} regressed rows", targets.len())))?;
@@ -177,16 +188,49 @@ impl Variant {
     /// The targets that get a row.
     fn chosen<'a>(
         &self,
-        (sparse, targets): (&Map, &Targets<'a>),
+        (sparse, targets, first): (&Map, &Targets<'a>, usize),
         ready: &Ready,
+        (rooms, scene): (&Rooms, &Scene),
+        context: Context<'_>,
     ) -> Result<Targets<'a>> {
-        let Some(Keep { share, least }) = self.keep else { return Ok(targets.clone()) };
+        let Some(Keep { share, at_most, least }) = self.keep else { return Ok(targets.clone()) };
         let doubts = match least {
             Doubt::Disagreement => disagreement(sparse, targets, &*ready.regressor, ready.options)?,
             Doubt::Variance => variances(sparse, targets)?,
             Doubt::Outside => outside(sparse, targets)?,
+            Doubt::Behind => {
+                // The anchors are rows of the sparse map, which begins at `first` in the room.
+                let (anchors, poses) = (targets.anchors().rows(), sparse.poses().six_dof()?);
+                let images: Vec<usize> = anchors.iter().map(|row| first + row).collect();
+                let recipe = named_recipe(&rooms.world(scene))?;
+                let seen = depths(&recipe, Side::References, &images)?;
+                let views = seen.iter().zip(anchors).map(|(depth, &row)| view(depth, poses[row]));
+                behind(targets, &views.collect::<Vec<_>>())
+            }
+            Doubt::Drawn => {
+                let mut random = ChaCha8Rng::seed_from_u64(context.resampling().seed);
+                targets.iter().map(|_| random.random()).collect()
+            }
+        };
+        let share = match at_most {
+            Some(limit) => {
+                let n = doubts.iter().filter(|it| **it <= limit).count();
+                share.min(n as f64 / doubts.len().max(1) as f64)
+            }
+            None => share,
         };
         targets.least_doubtful(&doubts, share)
+    }
+}
+
+/// What a generated camera measures.
+fn view(depth: &Depth, pose: Pose) -> DepthView<'_> {
+    let camera = &depth.camera;
+    DepthView {
+        pose,
+        focal: [camera.focal; 2],
+        centre: [0.5 * f64::from(camera.width), 0.5 * f64::from(camera.height)],
+        metres: depth.metres.view(),
     }
 }
 

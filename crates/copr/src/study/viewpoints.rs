@@ -2,7 +2,7 @@
 
 use vpr_core::Provenance;
 use vpr_report::{
-    figure::{Curve, Figure, Panel},
+    figure::{Curve, Figure, Panel, Shape},
     table::{Cell, Table},
 };
 
@@ -99,7 +99,8 @@ fn elsewhere(
             band.push((mte.low, mte.high));
         }
         if !points.is_empty() {
-            curves.push(Curve::new(name, points).of(Provenance::Generated).within(band));
+            let curve = Curve::new(name, points).of(Provenance::Generated).within(band);
+            curves.push(curve.shaped(Shape::Bars));
         }
     }
     let name = |(at, place): (usize, &Place)| (at as f64, place.name.clone());

@@ -1,6 +1,7 @@
 //! Poses to regress descriptors at.
 
 mod choice;
+mod depth;
 mod grid;
 
 use nalgebra::{Isometry3, Translation3, Vector3};
@@ -8,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use vpr_core::{Error as CoreError, Pose};
 
 pub use choice::disagreement;
+pub use depth::{DepthView, behind};
 pub use grid::Grid;
 
 use crate::{Anchors, Error, Result};

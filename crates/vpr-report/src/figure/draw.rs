@@ -4,6 +4,7 @@ use std::{collections::BTreeSet, fmt::Write as _};
 
 use super::{
     COLOURS, Curve, Figure, Mark, Shape, Style,
+    bars::bars,
     multiples::multiples,
     plan::{Anchor, Frame, Key, Plan, Rect, TEXT, TITLE, plan},
     text::escape,
@@ -151,7 +152,7 @@ fn draw_frame(out: &mut String, plan: &Plan<'_>, frame: &Frame<'_>, tolerance: (
         let curves = frame.multiple.shown.iter().map(|&index| &curves[index]);
         curves.filter_map(|curve| Some((curve, style(curve)?)))
     };
-    for (curve, style) in shown().filter(|it| !it.0.band.is_empty()) {
+    for (curve, style) in shown().filter(|it| !it.0.band.is_empty() && it.0.shape != Shape::Bars) {
         let edge = |end: fn(&(f64, f64)) -> f64| -> Vec<(f64, f64)> {
             curve.points.iter().zip(&curve.band).map(|(point, band)| (point.0, end(band))).collect()
         };
@@ -160,6 +161,7 @@ fn draw_frame(out: &mut String, plan: &Plan<'_>, frame: &Frame<'_>, tolerance: (
         let around = line(frame, &[low, high].concat(), tolerance.0);
         let _ = writeln!(out, "<path class=\"b c{}\" d=\"{around}Z\"/>", style.colour);
     }
+    let n_bars = shown().filter(|it| it.0.shape == Shape::Bars).count();
     for (nth, (curve, style)) in shown().enumerate() {
         let colour = style.colour;
         match curve.shape {
@@ -175,6 +177,7 @@ fn draw_frame(out: &mut String, plan: &Plan<'_>, frame: &Frame<'_>, tolerance: (
                 let path = dots.collect::<Vec<_>>().concat();
                 let _ = writeln!(out, "<path class=\"p c{colour}\" d=\"{path}\"/>");
             }
+            Shape::Bars => out.push_str(&bars(frame, (nth, n_bars), curve, style)),
             Shape::Thesis => {
                 let path =
                     places(frame, &curve.points).into_iter().map(|it| outline(style.mark, it, 4.2));
@@ -219,7 +222,8 @@ fn draw_key(out: &mut String, key: &Key) {
         }
         None => {}
     }
-    let path = outline(key.style.mark, (x, y), 3.6);
+    let mark = if key.shape == Shape::Bars { Mark::Square } else { key.style.mark };
+    let path = outline(mark, (x, y), 3.6);
     if key.shape == Shape::Thesis {
         let _ = writeln!(out, "<path class=\"w c{colour}\" d=\"{path}\"/>");
     } else {
@@ -335,14 +339,14 @@ fn outline(mark: Mark, (x, y): Place, radius: f64) -> String {
 }
 
 /// Pixels as whole tenths.
-fn tenths(pixels: f64) -> i64 {
+pub(super) fn tenths(pixels: f64) -> i64 {
     #[expect(clippy::cast_possible_truncation, reason = "pixels of a page")]
     let tenths = (pixels * 10.0).round() as i64;
     tenths
 }
 
 /// Tenths as a decimal number.
-fn number(tenths: i64) -> String {
+pub(super) fn number(tenths: i64) -> String {
     let (whole, rest) = (tenths.abs() / 10, tenths.abs() % 10);
     let sign = if tenths < 0 { "-" } else { "" };
     if rest == 0 { format!("{sign}{whole}") } else { format!("{sign}{whole}.{rest}") }

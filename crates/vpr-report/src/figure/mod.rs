@@ -6,6 +6,7 @@
 
 mod apart;
 mod axis;
+mod bars;
 mod draw;
 mod multiples;
 mod plan;
@@ -71,6 +72,8 @@ pub enum Shape {
     Line,
     /// Apart from each other.
     Points,
+    /// Bars from zero, one beside the other where curves share an `x`, which counts categories.
+    Bars,
     /// As hollow marks: what the thesis says where ours is a curve of the same name.
     Thesis,
 }

@@ -5,6 +5,7 @@ use super::{
     Shape,
     apart::apart,
     axis::Axis,
+    bars::reach,
     multiples::Multiple,
     text::{BOLD, width, wrap},
     theme::{Style, styles},
@@ -128,10 +129,11 @@ fn is_said(multiple: &Multiple<'_>, name: &str) -> bool {
 pub(super) fn plan<'a>(multiples: &'a [Multiple<'a>], caption: &str) -> Plan<'a> {
     let (columns, plot_width, plot_height) = grid(multiples.len());
     let styles = styles(&names(multiples));
-    let is_scatter = |it: &Multiple<'_>| {
-        it.shown.iter().any(|&index| it.panel.curves[index].shape == Shape::Points)
+    let is_apart = |it: &Multiple<'_>| {
+        let mut shapes = it.shown.iter().map(|&index| it.panel.curves[index].shape);
+        shapes.any(|it| matches!(it, Shape::Points | Shape::Bars))
     };
-    let is_direct = multiples.len() <= 4 && !multiples.iter().any(is_scatter);
+    let is_direct = multiples.len() <= 4 && !multiples.iter().any(is_apart);
     let axes: Vec<(Axis, Axis)> =
         multiples.iter().map(|it| axes(it, plot_width, plot_height)).collect();
     let y_lines: Vec<Vec<String>> =
@@ -211,9 +213,13 @@ fn axes(multiple: &Multiple<'_>, plot_width: f64, plot_height: f64) -> (Axis, Ax
         points().map(|it| it.1).collect::<Vec<_>>()
     };
     let bands = panel.curves.iter().flat_map(|it| it.band.iter().flat_map(|it| [it.0, it.1]));
+    let bars = reach(&panel.curves);
+    let sides = bars.iter().flat_map(|it| it.0);
+    let xs = points().map(|it| it.0).chain(sides);
+    let ys = heights.into_iter().chain(bands).chain(bars.map(|it| it.1));
     (
-        Axis::over(points().map(|it| it.0), panel.x_scale, plot_width / 60.0, &panel.x_ticks),
-        Axis::over(heights.into_iter().chain(bands), panel.y_scale, plot_height / 42.0, &[]),
+        Axis::over(xs, panel.x_scale, plot_width / 60.0, &panel.x_ticks),
+        Axis::over(ys, panel.y_scale, plot_height / 42.0, &[]),
     )
 }
 

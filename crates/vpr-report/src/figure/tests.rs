@@ -1,6 +1,7 @@
 //! Every figure of the book from synthetic curves of the same shapes: names stay off the curves and
 //! inside of the picture, and no two curves of a panel look alike.
 
+mod bars;
 mod reading;
 mod shown;
 
@@ -277,6 +278,7 @@ fn figures() -> Vec<(&'static str, Figure)> {
         ("figure-5.11", clouds()),
         ("worlds", intervals()),
         ("search-scaling", times()),
+        ("bars", bars::encoders()),
         ("empty", Figure { panels: vec![Panel::default()] }),
         ("none", Figure::default()),
     ]

@@ -165,14 +165,12 @@ impl WithSimd for Piece<'_> {
         let mut blocks = vec![[0.0; TILE]; N_FREQUENCIES * n];
         let [_, n_channels, height, width] = self.tiles.geometry.input;
         let last = ((self.panel + 1) * TILE).min(self.tiles.len());
-        let places: Vec<_> = (self.panel * TILE..last).map(|it| self.tiles.place(it)).collect();
-        let before = self.tiles.geometry.before;
+        let windows: Vec<_> = (self.panel * TILE..last).map(|it| self.tiles.window(it)).collect();
         let mut patch = [[0.0; TILE]; N_FREQUENCIES];
         for (index, channel) in self.channels.enumerate() {
-            for (lane, &(image, [top, left])) in places.iter().enumerate() {
+            for (lane, (image, window)) in windows.iter().enumerate() {
                 let plane = &self.input[(image * n_channels + channel) * height * width..];
-                let plane = &plane[..height * width];
-                gather(plane, [height, width], [top, left], before, lane, &mut patch);
+                window.gather(&plane[..height * width], width, lane, &mut patch);
             }
             frequencies_of_input(simd, &mut patch);
             for (frequency, lanes) in patch.iter().enumerate() {
@@ -183,34 +181,56 @@ impl WithSimd for Piece<'_> {
     }
 }
 
-/// Copies the 6×6 inputs of a tile into one lane, zeros where the padding is.
-#[inline(always)]
-fn gather(
-    plane: &[f32],
-    [height, width]: [usize; 2],
-    [top, left]: [usize; 2],
-    before: [usize; 2],
-    lane: usize,
-    patch: &mut [Lanes; N_FREQUENCIES],
-) {
-    let is_inside = top >= before[0]
-        && left >= before[1]
-        && top + REACH <= height + before[0]
-        && left + REACH <= width + before[1];
-    if is_inside {
-        let start = (top - before[0]) * width + left - before[1];
-        for (row, patch) in patch.as_chunks_mut::<REACH>().0.iter_mut().enumerate() {
-            let source: &[f32] = &plane[start + row * width..][..REACH];
-            for (lanes, &value) in patch.iter_mut().zip(source) {
+/// The 6×6 inputs of a tile, as far as they lie within their plane.
+struct Window {
+    /// Rows and columns of the patch that do.
+    rows: Range<usize>,
+    columns: Range<usize>,
+    /// The first of them in the plane.
+    start: usize,
+}
+
+impl Tiles {
+    /// The image of a tile and its inputs there.
+    fn window(&self, tile: usize) -> (usize, Window) {
+        let (image, at) = self.place(tile);
+        let Geometry { input: [_, _, height, width], before, .. } = self.geometry;
+        let inside = |axis: usize, length: usize| {
+            let first = before[axis].saturating_sub(at[axis]).min(REACH);
+            let last = (length + before[axis]).saturating_sub(at[axis]).clamp(first, REACH);
+            (first..last, (at[axis] + first).saturating_sub(before[axis]))
+        };
+        let ((rows, top), (columns, left)) = (inside(0, height), inside(1, width));
+        (image, Window { rows, columns, start: top * width + left })
+    }
+}
+
+impl Window {
+    /// Copies the inputs into one lane, zeros where the padding is.
+    #[inline(always)]
+    fn gather(&self, plane: &[f32], width: usize, lane: usize, patch: &mut [Lanes; N_FREQUENCIES]) {
+        let lines = patch.as_chunks_mut::<REACH>().0;
+        if self.rows.len() == REACH && self.columns.len() == REACH {
+            for (row, lines) in lines.iter_mut().enumerate() {
+                let source: &[f32] = &plane[self.start + row * width..][..REACH];
+                for (lanes, &value) in lines.iter_mut().zip(source) {
+                    lanes[lane] = value;
+                }
+            }
+            return;
+        }
+        for (row, lines) in lines.iter_mut().enumerate() {
+            let mut line = [0.0; REACH];
+            if self.rows.contains(&row) {
+                let source = &plane[self.start + (row - self.rows.start) * width..];
+                for (value, &source) in line[self.columns.clone()].iter_mut().zip(source) {
+                    *value = source;
+                }
+            }
+            for (lanes, value) in lines.iter_mut().zip(line) {
                 lanes[lane] = value;
             }
         }
-        return;
-    }
-    for (index, lanes) in patch.iter_mut().enumerate() {
-        let y = (top + index / REACH).checked_sub(before[0]).filter(|&it| it < height);
-        let x = (left + index % REACH).checked_sub(before[1]).filter(|&it| it < width);
-        lanes[lane] = y.zip(x).map_or(0.0, |(y, x)| plane[y * width + x]);
     }
 }
 
