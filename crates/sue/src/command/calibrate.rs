@@ -93,7 +93,7 @@ pub(crate) fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
         cli::print(&format!("{words}\n"))?;
         return Ok(Outcome::Success);
     }
-    let origin = Origin::new(args.estimator, &input);
+    let origin = Origin::new(args.estimator, input.settings, input.scale);
     let mut object = object;
     object["guarantee"] = words.into();
     for (key, value) in serde_json::to_value(origin)?.as_object().into_iter().flatten() {

@@ -75,7 +75,8 @@ pub(crate) fn run(args: &EstimateArgs) -> anyhow::Result<Outcome> {
         input.check_poses(&[args.estimator])?;
     }
     // A threshold of an estimator says nothing about variances.
-    let origin = args.variances.is_none().then(|| Origin::new(args.estimator, &input));
+    let origin =
+        args.variances.is_none().then(|| Origin::new(args.estimator, input.settings, input.scale));
     let threshold = args.threshold.as_ref().map(|it| it.open(origin.as_ref())).transpose()?;
     let variances = args.variances.as_deref().map(npy::read_f32).transpose()?;
     if let (Some(variances), Some(path)) = (&variances, &args.variances) {

@@ -6,7 +6,7 @@ use anyhow::{Context as _, bail};
 use serde::{Deserialize, Serialize};
 use sue::{EstimatorChoice, EstimatorSettings, Share, Threshold};
 
-use super::{input::Input, normalization::Scale};
+use super::normalization::Scale;
 
 /// What was given for `--threshold`.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,9 +29,13 @@ pub(crate) struct Origin {
 }
 
 impl Origin {
-    /// The estimator on this input.
-    pub(crate) fn new(estimator: EstimatorChoice, input: &Input) -> Self {
-        Self { estimator, settings: input.settings, normalized: input.scale != Scale::Other }
+    /// The estimator with these settings on descriptors of that scale.
+    pub(crate) fn new(
+        estimator: EstimatorChoice,
+        settings: EstimatorSettings,
+        scale: Scale,
+    ) -> Self {
+        Self { estimator, settings, normalized: scale != Scale::Other }
     }
 }
 

@@ -6,7 +6,8 @@ use vpr_files::{npy::npz, pickle::Value};
 use super::{
     content::Said,
     positions,
-    resolve::{Lists, Task, resolve},
+    resolve::resolve,
+    task::{Lists, Task},
     value,
 };
 

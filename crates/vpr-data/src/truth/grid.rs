@@ -7,7 +7,7 @@ use vpr_core::Result;
 use super::{
     Form, Rows,
     content::{Grid, Said},
-    resolve::{Lists, Task, note_unnamed},
+    task::{Lists, Task, note_unnamed},
 };
 
 /// Keys whose matrices have the references as rows, in the tutorial that they come from.

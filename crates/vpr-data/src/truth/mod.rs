@@ -32,6 +32,7 @@ mod positions;
 mod resolve;
 mod scores;
 mod side;
+mod task;
 mod text;
 mod value;
 
@@ -44,7 +45,8 @@ use vpr_core::{Error, GroundTruth, Result};
 use vpr_files::{npy, pickle};
 
 use content::Said;
-use resolve::{Task, resolve};
+use resolve::resolve;
+use task::{Lists, Task};
 
 pub(crate) use check::problems;
 pub use file::GroundTruthFile;
@@ -220,7 +222,7 @@ pub fn read_lists(
     Ok((GroundTruthFile { path: path.to_owned(), lists }, notes))
 }
 
-fn of_value(task: Task<'_>, value: pickle::Value) -> Result<(resolve::Lists, Vec<String>)> {
+fn of_value(task: Task<'_>, value: pickle::Value) -> Result<(Lists, Vec<String>)> {
     // An array of no axes around a dictionary is what `numpy.save` makes of one.
     let value = match value {
         pickle::Value::Array { shape, elements: pickle::Elements::Object(mut values) }

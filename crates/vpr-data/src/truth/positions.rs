@@ -4,7 +4,7 @@ use nalgebra::{Point2, Point3};
 use vpr_core::{GroundTruth, Poses, Result};
 use vpr_files::pickle::Value;
 
-use super::resolve::{Lists, Task};
+use super::task::{Lists, Task};
 
 /// Names of the arrays, lower case without `_`: positions of the queries.
 const QUERIES: [&str; 6] = ["utmq", "qutm", "qutms", "utmqueries", "queriesutm", "queriesutms"];

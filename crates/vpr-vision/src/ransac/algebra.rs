@@ -1,6 +1,6 @@
 //! Linear algebra of small matrices.
 
-use super::search::Matrix;
+use super::geometry::Matrix;
 
 /// aᵀ b.
 pub(super) fn transpose_times(a: &Matrix, b: &Matrix) -> Matrix {

@@ -4,8 +4,8 @@ use super::{
     Correspondence,
     algebra::orthogonal_complement,
     fundamental::{equation, is_near_epipolar},
+    geometry::{Geometry, Matrix},
     polynomial::real_roots,
-    search::{Geometry, Matrix},
 };
 
 /// Referenceᵀ · model · query = 0, for points at focal length 1.

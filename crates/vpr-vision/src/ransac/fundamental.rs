@@ -6,7 +6,7 @@ use super::{
         Normalization, hartley, orthogonal_complement, product, smallest_eigenvector,
         transpose_times,
     },
-    search::{Geometry, Matrix},
+    geometry::{Geometry, Matrix},
 };
 
 /// Referenceᵀ · model · query = 0.

@@ -3,7 +3,7 @@
 use super::{
     Correspondence,
     algebra::{hartley, product, smallest_eigenvector},
-    search::{Geometry, Matrix},
+    geometry::{Geometry, Matrix},
 };
 
 /// Reference = model · query.

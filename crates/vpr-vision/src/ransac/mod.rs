@@ -9,6 +9,7 @@
 mod algebra;
 mod essential;
 mod fundamental;
+mod geometry;
 mod homography;
 mod polynomial;
 mod sampling;
@@ -18,10 +19,8 @@ use serde::{Deserialize, Serialize};
 use vpr_core::{Error, Result};
 
 use self::{
-    essential::Essential,
-    fundamental::Fundamental,
-    homography::Homography,
-    search::{Geometry, search},
+    essential::Essential, fundamental::Fundamental, geometry::Geometry, homography::Homography,
+    search::search,
 };
 use crate::{features::LocalFeatures, matching::Match};
 

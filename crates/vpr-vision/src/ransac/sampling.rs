@@ -7,7 +7,7 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
-use super::{Correspondence, search::Geometry};
+use super::{Correspondence, geometry::Geometry};
 
 /// A sample is drawn again at most so often; then it is taken as it is.
 const ATTEMPTS: usize = 100;
