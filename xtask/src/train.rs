@@ -147,7 +147,8 @@ const RSF: [&str; 6] = [
 ];
 
 /// The same of the heads on the default network's trunk.
-const RSF_HEADS: [&str; 4] = ["train", "--experiment", "experiments/table-4.3-heads.toml", "--place"];
+const RSF_HEADS: [&str; 4] =
+    ["train", "--experiment", "experiments/table-4.3-heads.toml", "--place"];
 
 /// `default-encoder head` as a committed head was made.
 fn head(name: &'static str, output: &'static str) -> Vec<&'static str> {

@@ -23,7 +23,8 @@ const SAVE_EVERY: usize = 50;
 pub(crate) const COLUMNS: [&str; 4] =
     ["loss", "learning_rate", "recall_at_1_unseen_day", "recall_at_1_unseen_night"];
 /// How the images of a city lie.
-pub(crate) const CITY: Arrangement = Arrangement { places: PLACES, visits: VISITS, avenues: AVENUES };
+pub(crate) const CITY: Arrangement =
+    Arrangement { places: PLACES, visits: VISITS, avenues: AVENUES };
 /// Steps between two validations.
 const VALIDATE_EVERY: usize = 200;
 

@@ -1,5 +1,7 @@
 //! Fine-tuning of the heads on the default network's trunk, by the names of their methods.
 
+#![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
+
 use std::{
     fs,
     path::{Path, PathBuf},

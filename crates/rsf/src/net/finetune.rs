@@ -347,12 +347,7 @@ fn core(err: crate::Error) -> CoreError {
 
 /// Keeps a network if none is better: by recall, then by gap. One that a killed run had reached after
 /// its last checkpoint is reached again, with the same score.
-fn keep_if_best<N: Tunable>(
-    folder: &Path,
-    step: usize,
-    score: Score,
-    network: &N,
-) -> Result<()> {
+fn keep_if_best<N: Tunable>(folder: &Path, step: usize, score: Score, network: &N) -> Result<()> {
     let before = best(folder)?;
     if before.as_ref().is_some_and(|(_, old, _)| !is_better(&score, old)) {
         return Ok(());

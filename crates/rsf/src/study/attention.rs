@@ -100,13 +100,12 @@ pub(super) fn attention(
 
 /// The network of a row; `None` if its weights are not at hand.
 fn boq(place: &Place, encoder: &Encoder, sources: &Sources<'_>) -> Result<Option<BoqDefault>> {
-    let path = match encoder.weights_for(place, None) {
-        Some(weights) => sources.locate(Path::new(&weights))?,
-        None => {
-            let method = Method::find(&encoder.method, None)?;
-            let file = method.file(method.dimension(None)?);
-            sources.locate(&Path::new("models").join(file))?
-        }
+    let path = if let Some(weights) = encoder.weights_for(place, None) {
+        sources.locate(Path::new(&weights))?
+    } else {
+        let method = Method::find(&encoder.method, None)?;
+        let file = method.file(method.dimension(None)?);
+        sources.locate(&Path::new("models").join(file))?
     };
     let Some(path) = path else { return Ok(None) };
     let mut network = BoqDefault::init(&vpr_nets::device());
