@@ -25,6 +25,10 @@ pub(crate) struct Args {
 enum Network {
     /// `crates/vpr-nets/models/default-encoder.safetensors`
     DefaultEncoder,
+    /// `data/models/boq-default.safetensors`
+    BoqDefault,
+    /// `data/models/salad-default.safetensors`
+    SaladDefault,
     /// `crates/vpr-vision/models/dense-vlad.safetensors`
     DenseVlad,
     /// `crates/vpr-vision/models/hog-vlad.safetensors`
@@ -77,6 +81,10 @@ enum Network {
     RsfStreet,
     /// `data/models/rsf-eynsham.safetensors` and what it is held against
     RsfEynsham,
+    /// `data/models/rsf-boq-rail.safetensors` and that of SALAD
+    RsfHeadsRail,
+    /// `data/models/rsf-boq-archive.safetensors` and that of SALAD
+    RsfHeadsArchive,
 }
 
 /// `copr train encoder` as the committed weights were made; the loss follows.
@@ -138,6 +146,17 @@ const RSF: [&str; 6] = [
     "--place",
 ];
 
+/// The same of the heads on the default network's trunk.
+const RSF_HEADS: [&str; 4] =
+    ["train", "--experiment", "experiments/table-4.3-heads.toml", "--place"];
+
+/// `default-encoder head` as a committed head was made.
+fn head(name: &'static str, output: &'static str) -> Vec<&'static str> {
+    vec!["head", name, "--output", output]
+}
+
+const BOQ: &str = "data/models/boq-default.safetensors";
+const SALAD: &str = "data/models/salad-default.safetensors";
 const DENSE_VLAD: &str = "crates/vpr-vision/models/dense-vlad.safetensors";
 const HOG_VLAD: &str = "crates/vpr-vision/models/hog-vlad.safetensors";
 
@@ -150,11 +169,14 @@ fn vocabulary(name: &'static str, output: &'static str) -> Vec<&'static str> {
 fn command(network: Network) -> (&'static str, Vec<&'static str>) {
     let with = |words: &[&'static str], rest: &[&'static str]| [words, rest].concat();
     let rsf = |place| ("rsf", with(&RSF, &[place]));
+    let heads = |place| ("rsf", with(&RSF_HEADS, &[place]));
     let encoder = |loss| ("copr", with(ENCODER, &[loss]));
     let regressor = |rest: &[&'static str]| ("copr", with(ROOMS, rest));
     let place = |rest: &[&'static str]| ("copr", with(PLACE, rest));
     match network {
         Network::DefaultEncoder => ("default-encoder", vec!["train"]),
+        Network::BoqDefault => ("default-encoder", head("boq", BOQ)),
+        Network::SaladDefault => ("default-encoder", head("salad", SALAD)),
         Network::DenseVlad => ("bench", vocabulary("dense-vlad", DENSE_VLAD)),
         Network::HogVlad => ("bench", vocabulary("hog-vlad", HOG_VLAD)),
         Network::Btl => ("sue", vec!["train", "btl"]),
@@ -187,6 +209,8 @@ fn command(network: Network) -> (&'static str, Vec<&'static str>) {
         Network::RsfArchive => rsf("archive"),
         Network::RsfStreet => rsf("street"),
         Network::RsfEynsham => rsf("eynsham"),
+        Network::RsfHeadsRail => heads("rail"),
+        Network::RsfHeadsArchive => heads("archive"),
     }
 }
 

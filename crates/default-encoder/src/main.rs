@@ -1,6 +1,7 @@
 //! The `default-encoder` program: trains the default network on generated streets and says how far
 //! it carries.
 
+mod head;
 mod train;
 mod validate;
 
@@ -23,6 +24,8 @@ struct Args {
 enum Command {
     /// Train it on generated streets; a killed run goes on where it stopped
     Train(train::Args),
+    /// Train another head on its trunk, which stays; a killed run goes on where it stopped
+    Head(head::Args),
     /// Recall@1 on worlds it has not seen, and on real datasets at hand
     Validate(validate::Args),
     #[command(flatten)]
@@ -35,6 +38,7 @@ fn main() -> ExitCode {
         quiet.heed();
         match command {
             Command::Train(args) => train::run(&args),
+            Command::Head(args) => head::run(&args),
             Command::Validate(args) => validate::run(&args),
             Command::Shell(args) => args.run::<Args>(),
         }

@@ -20,10 +20,11 @@ const LOG_EVERY: usize = 25;
 /// Steps between two checkpoints, a multiple of those between two lines.
 const SAVE_EVERY: usize = 50;
 /// Columns of the log after the step.
-const COLUMNS: [&str; 4] =
+pub(crate) const COLUMNS: [&str; 4] =
     ["loss", "learning_rate", "recall_at_1_unseen_day", "recall_at_1_unseen_night"];
 /// How the images of a city lie.
-const CITY: Arrangement = Arrangement { places: PLACES, visits: VISITS, avenues: AVENUES };
+pub(crate) const CITY: Arrangement =
+    Arrangement { places: PLACES, visits: VISITS, avenues: AVENUES };
 /// Steps between two validations.
 const VALIDATE_EVERY: usize = 200;
 

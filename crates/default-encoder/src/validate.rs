@@ -15,7 +15,10 @@ use vpr_core::{
 };
 use vpr_data::{DataRoots, Dataset, Datasets};
 use vpr_nets::{
-    model::default::{DefaultEncoder, DefaultEncoderConfig, INPUT},
+    model::{
+        Tunable,
+        default::{DefaultEncoder, DefaultEncoderConfig, INPUT},
+    },
     train::planes,
 };
 use vpr_report::cli::{self, Outcome};
@@ -176,11 +179,11 @@ impl Trial {
     }
 
     /// Recall@1 by day and by night.
-    pub(crate) fn recalls(&self, network: &DefaultEncoder) -> vpr_core::Result<[f64; 2]> {
+    pub(crate) fn recalls(&self, network: &impl Tunable) -> vpr_core::Result<[f64; 2]> {
         let mut recalls = [0.0; 2];
         for (recall, (queries, references, truth)) in recalls.iter_mut().zip(&self.parts) {
-            let queries = network.describe(queries, INPUT, BATCH)?;
-            let references = network.describe(references, INPUT, BATCH)?;
+            let queries = network.rows(queries, INPUT, BATCH)?;
+            let references = network.rows(references, INPUT, BATCH)?;
             *recall = recall_at(1, &retrieve(&queries, &references, 1)?, truth)?;
         }
         Ok(recalls)

@@ -63,6 +63,11 @@ const ON_REQUEST: [HandCraftedEntry; 2] = [
 const NETWORKS: [(&str, &str); 2] =
     [("default", "default network"), ("netvlad-mobilenetv2-rgb", "NetVLAD, MobileNetV2")];
 
+/// Networks that have a column name, but no column where all run: other heads on the trunk of the
+/// default network, whose weights are in `data/models` of every clone.
+const HEADS: [(&str, &str); 2] =
+    [("boq-default", "BoQ, default trunk"), ("salad-default", "SALAD, default trunk")];
+
 /// A technique without a network by its name.
 #[must_use]
 pub fn hand_crafted(name: &str) -> Option<Runner> {
@@ -147,7 +152,8 @@ fn network(name: &str, roots: &DataRoots) -> Result<Found> {
         let origin = method.origin(dimension);
         return Ok(Found::Absent(format!("{name}: its weights are not at hand; origin: {origin}")));
     }
-    let column = NETWORKS.into_iter().find(|entry| entry.0 == name).map_or("network", |it| it.1);
+    let named = NETWORKS.into_iter().chain(HEADS);
+    let column = named.into_iter().find(|entry| entry.0 == name).map_or("network", |it| it.1);
     let technique = Arc::new(crate::Network::new(by_name(name, None, &roots.roots)?.into()));
     let (name, encoder) = (name.to_owned(), name.to_owned());
     Ok(Found::Runs(Runner { name, column, encoder, technique }))

@@ -1,6 +1,6 @@
 //! One network is adapted to one map, and its weights are written.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rsf::{
     Preset, ReferenceSet,
@@ -9,8 +9,9 @@ use rsf::{
     },
 };
 use vpr_nets::{
-    model::default::DefaultEncoder,
-    train::Run,
+    encode::{Start, Task, tune},
+    model::Tunable,
+    train::{Run, device},
     weights::{Precision, save},
 };
 use vpr_report::cli::{self, ReportArgs};
@@ -23,6 +24,10 @@ pub(crate) struct Adaptation<'a> {
     pub(crate) name: &'a str,
     /// The map.
     pub(crate) set: &'a ReferenceSet,
+    /// The network.
+    pub(crate) method: &'a str,
+    /// Data folders, which weights are looked for in.
+    pub(crate) roots: &'a [PathBuf],
     /// Weights to begin with, instead of those that every clone has.
     pub(crate) weights: Option<&'a Path>,
     /// The weights to write; the log lands beside them.
@@ -49,8 +54,18 @@ impl Adaptation<'_> {
 
     /// Steps under the triplet loss; goes on where a killed run stopped.
     pub(crate) fn finetune(&self, settings: &Finetuning) -> anyhow::Result<()> {
-        let material = Material::open(self.set)?;
-        let (network, digest) = default_network(self.weights)?;
+        let steps = Steps { adaptation: self, settings };
+        tune(self.method, self.weights, self.roots, &device(), steps)?
+    }
+
+    fn take_steps<N: Tunable>(
+        &self,
+        settings: &Finetuning,
+        network: N,
+        start: Start,
+    ) -> anyhow::Result<()> {
+        let Start { preprocessing, size, digest } = start;
+        let material = Material::open_for(self.set, preprocessing, size)?;
         let stem = self.output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let usual = Path::new("target").join(format!("rsf-{stem}"));
         let folder = self.checkpoints.unwrap_or(&usual);
@@ -60,22 +75,22 @@ impl Adaptation<'_> {
         let tuned =
             finetune(settings, network.clone(), (self.set, &material), &mut run, folder, show)?;
         facts.push(("best", format!("{}, {}", place(&tuned), told(tuned.best))));
-        save(&tuned.network, self.output, &facts, self.precision)?;
+        tuned.network.write(self.output, &facts, self.precision)?;
         cli::note(&verdict(&tuned));
         cli::note(&format!("{}: {}", self.name, self.output.display()));
         self.show(&material, (&network, &tuned.network), settings.seed)
     }
 
     /// What it did to references that are changed, as a line for people and as a report.
-    fn show(
+    fn show<N: Tunable>(
         &self,
         material: &Material,
-        (before, after): (&DefaultEncoder, &DefaultEncoder),
+        (before, after): (&N, &N),
         seed: u64,
     ) -> anyhow::Result<()> {
         let Some(args) = self.report else { return Ok(()) };
         let trial = report::trial(material, Preset::All, seed)?;
-        let recall = |network: &DefaultEncoder| -> rsf::Result<f64> {
+        let recall = |network: &N| -> rsf::Result<f64> {
             Ok(trial.score(network, &material.describe(network)?)?.recall)
         };
         let (of_before, of_after) = (recall(before)?, recall(after)?);
@@ -90,8 +105,22 @@ impl Adaptation<'_> {
     }
 }
 
+/// Fine-tuning of whichever network.
+struct Steps<'a> {
+    adaptation: &'a Adaptation<'a>,
+    settings: &'a Finetuning,
+}
+
+impl Task for Steps<'_> {
+    type Output = anyhow::Result<()>;
+
+    fn with<N: Tunable>(self, network: N, start: Start) -> Self::Output {
+        self.adaptation.take_steps(self.settings, network, start)
+    }
+}
+
 /// Which network it was.
-fn place(tuned: &Outcome) -> String {
+fn place<N>(tuned: &Outcome<N>) -> String {
     format!("step {}, {} of the way", tuned.best_step, tuned.share)
 }
 
@@ -100,7 +129,7 @@ fn told(score: Score) -> String {
 }
 
 /// Whether the map itself says that it was worth it.
-fn verdict(tuned: &Outcome) -> String {
+fn verdict<N>(tuned: &Outcome<N>) -> String {
     let Outcome { best_step, best, before, .. } = tuned;
     if *best_step == 0 {
         return "no round was better on held-out references: the weights are those it began with"

@@ -17,7 +17,8 @@ use super::{adaptation::Adaptation, map::MapArgs};
 pub(crate) struct FinetuneArgs {
     #[command(flatten)]
     map: MapArgs,
-    /// The network; `default` is the one that can be tuned here
+    /// The network: `default`, `boq-default`, `salad-default`, or another whose weights are at hand or
+    /// given
     #[arg(long, default_value = "default", value_name = "NAME")]
     method: String,
     /// Weights to begin with, instead of those that every clone has
@@ -82,7 +83,8 @@ pub(crate) struct FinetuneArgs {
 }
 
 pub(crate) fn run(args: &FinetuneArgs) -> anyhow::Result<Outcome> {
-    ensure!(args.method == "default", "`{}`: only `default` can be tuned here", args.method);
+    let is_default = args.method == "default";
+    ensure!(is_default || !args.whitening, "--whitening is for the default network alone");
     let mut settings = args.settings();
     settings.check()?;
     args.report.check()?;
@@ -91,6 +93,8 @@ pub(crate) fn run(args: &FinetuneArgs) -> anyhow::Result<Outcome> {
     let adaptation = Adaptation {
         name: &name,
         set: &set,
+        method: &args.method,
+        roots: &args.map.data.folders(),
         weights: args.weights.as_deref(),
         output: &args.output,
         checkpoints: args.checkpoints.as_deref(),

@@ -8,7 +8,7 @@ use rsf::{
     net::{Material, Trial},
 };
 use vpr_core::{GroundTruth, retrieve};
-use vpr_nets::model::default::DefaultEncoder;
+use vpr_nets::model::Tunable;
 use vpr_report::{
     cli::{self, ReportArgs},
     report::{Dataset, Match, Report, Run, Side},
@@ -31,11 +31,11 @@ pub(super) fn trial(material: &Material, preset: Preset, seed: u64) -> rsf::Resu
 }
 
 /// Writes the report that the flags ask for: what each network finds of each trial.
-pub(super) fn write(
+pub(super) fn write<N: Tunable>(
     args: &ReportArgs,
     (title, set, material): (&str, &ReferenceSet, &Material),
     trials: &[(Preset, Trial)],
-    networks: &[(&str, &DefaultEncoder)],
+    networks: &[(&str, &N)],
 ) -> anyhow::Result<()> {
     if args.path.is_none() {
         return Ok(());
@@ -63,7 +63,7 @@ pub(super) fn write(
     };
     let mut runs = Vec::new();
     for (dataset, (_, trial)) in trials.iter().enumerate() {
-        for (name, network) in networks {
+        for &(name, network) in networks {
             runs.push(run(name, dataset, (trial, material), network)?);
         }
     }
@@ -95,11 +95,11 @@ pub(super) fn write(
 }
 
 /// What a network finds of a trial.
-fn run(
+fn run<N: Tunable>(
     name: &str,
     dataset: usize,
     (trial, material): (&Trial, &Material),
-    network: &DefaultEncoder,
+    network: &N,
 ) -> anyhow::Result<Run> {
     let found = retrieve(&trial.describe(network)?, &material.describe(network)?, RANKS)?;
     let matches = |query: usize| {

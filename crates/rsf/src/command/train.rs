@@ -85,6 +85,8 @@ fn adapt(
     let adaptation = Adaptation {
         name: &place.name,
         set: &set,
+        method: &encoder.method,
+        roots: &sources.roots().roots,
         weights: None,
         output,
         checkpoints: None,

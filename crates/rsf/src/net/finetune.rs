@@ -8,7 +8,10 @@ use std::{
 use serde::Deserialize;
 use vpr_core::Error as CoreError;
 use vpr_nets::{
-    model::default::{DefaultEncoder, DefaultEncoderConfig},
+    model::{
+        Tunable,
+        default::{DefaultEncoder, DefaultEncoderConfig},
+    },
     train::{Checkpoint, Descent, Log, Optimizer, Report, Run, Schedule, device},
     weights::{self, Precision, Weights},
 };
@@ -85,9 +88,9 @@ impl Default for Finetuning {
 
 /// What came of it.
 #[derive(Debug)]
-pub struct Outcome {
+pub struct Outcome<N = DefaultEncoder> {
     /// The network of the best validation; the one that it began with if none was better.
-    pub network: DefaultEncoder,
+    pub network: N,
     /// Steps after which it was best; 0 for the network that it began with.
     pub best_step: usize,
     /// Share of the way from the network that it began with to the one of these steps.
@@ -175,7 +178,12 @@ impl Finetuning {
         Ok(())
     }
 
-    fn mine(&self, student: &Student, material: &Material, split: &Split) -> Result<Mined> {
+    fn mine<N: Tunable>(
+        &self,
+        student: &Student<N>,
+        material: &Material,
+        split: &Split,
+    ) -> Result<Mined> {
         let Some(poses) = material.poses() else {
             return Mined::without_poses(material.len(), &split.training);
         };
@@ -197,14 +205,14 @@ impl Finetuning {
 /// [`CoreError::Parameter`] for numbers out of range; [`crate::Error::OnePlace`] and
 /// [`crate::Error::TooFew`] for a map with nothing to tell apart; [`crate::Error::NoSuchPart`]; those
 /// of `observe`, of [`Run::descend`] and of files.
-pub fn finetune(
+pub fn finetune<N: Tunable>(
     settings: &Finetuning,
-    network: DefaultEncoder,
+    network: N,
     (set, material): (&ReferenceSet, &Material),
     run: &mut Run,
     folder: &Path,
     mut observe: impl FnMut(usize, f64, Score) -> vpr_core::Result<()>,
-) -> Result<Outcome> {
+) -> Result<Outcome<N>> {
     settings.check()?;
     let split = set.split(settings.held_out, settings.seed)?;
     let augmentations = settings.augmentations.augmentations();
@@ -216,11 +224,12 @@ pub fn finetune(
         &unseen,
         (&settings.mining, settings.seed),
     )?;
-    let judge = |network: &DefaultEncoder| trial.score(network, &material.describe(network)?);
+    let judge = |network: &N| trial.score(network, &material.describe(network)?);
     let before = judge(&network)?;
     observe(0, f64::NAN, before)?;
     keep_if_best(folder, 0, before, &network)?;
     weights::save(&network, &folder.join(START), &[], Precision::Single)?;
+    let like = network.clone();
     let mut student = Student::new(network, settings.margin, &settings.frozen)?;
     let done = Checkpoint::new(folder).latest()?.unwrap_or(0) / settings.round;
     for round in done..=settings.steps / settings.round {
@@ -253,25 +262,27 @@ pub fn finetune(
             },
         )?;
     }
-    chosen(folder, before, judge)
+    chosen(folder, like, before, judge)
 }
 
 /// The best network in a folder, or one on the way to it.
-fn chosen(
+fn chosen<N: Tunable>(
     folder: &Path,
+    like: N,
     before: Score,
-    judge: impl Fn(&DefaultEncoder) -> Result<Score>,
-) -> Result<Outcome> {
+    judge: impl Fn(&N) -> Result<Score>,
+) -> Result<Outcome<N>> {
     let (best_step, best, path) =
         best(folder)?.ok_or_else(|| CoreError::format(folder, "best network", "is not there"))?;
     let [start, end] = [Weights::open(&folder.join(START))?, Weights::open(&path)?];
     let best = Score { n: before.n, ..best };
-    let whole = Outcome { network: mixed(&start, &end, 1.0)?, best_step, share: 1.0, best, before };
+    let network = mixed(like.clone(), &start, &end, 1.0)?;
+    let whole = Outcome { network, best_step, share: 1.0, best, before };
     if best_step == 0 {
         return Ok(whole);
     }
     SHARES.iter().rev().try_fold(whole, |outcome, &share| {
-        let network = mixed(&start, &end, share)?;
+        let network = mixed(like.clone(), &start, &end, share)?;
         let best = judge(&network)?;
         Ok(if is_better(&best, &outcome.best) {
             Outcome { network, share, best, ..outcome }
@@ -301,17 +312,17 @@ pub fn last(settings: &Finetuning, folder: &Path) -> Result<DefaultEncoder> {
 }
 
 /// Mines, and takes the steps of a round.
-fn one_round(
+fn one_round<N: Tunable>(
     settings: &Finetuning,
-    (student, round, descent): (Student, usize, &Descent),
+    (student, round, descent): (Student<N>, usize, &Descent),
     (material, split, augmentations): (&Material, &Split, &Augmentations),
     run: &mut Run,
-    mut judged: impl FnMut(&Report, &DefaultEncoder) -> Result<Score>,
-) -> Result<Student> {
+    mut judged: impl FnMut(&Report, &N) -> Result<Score>,
+) -> Result<Student<N>> {
     let mined = settings.mine(&student, material, split)?;
     let lessons = Lessons::new(material, mined, augmentations, settings.batch, settings.seed)?;
     let end = (round + 1) * settings.round;
-    let cells = |report: &Report, student: &Student| {
+    let cells = |report: &Report, student: &Student<N>| {
         let mut cells = vec![format!("{:.5}", report.loss), format!("{:.3e}", report.rate)];
         if report.step == end {
             let score = judged(report, student.network()).map_err(core)?;
@@ -336,7 +347,7 @@ fn core(err: crate::Error) -> CoreError {
 
 /// Keeps a network if none is better: by recall, then by gap. One that a killed run had reached after
 /// its last checkpoint is reached again, with the same score.
-fn keep_if_best(folder: &Path, step: usize, score: Score, network: &DefaultEncoder) -> Result<()> {
+fn keep_if_best<N: Tunable>(folder: &Path, step: usize, score: Score, network: &N) -> Result<()> {
     let before = best(folder)?;
     if before.as_ref().is_some_and(|(_, old, _)| !is_better(&score, old)) {
         return Ok(());

@@ -11,6 +11,8 @@ use crate::{Augmentations, Error, Mined, Result};
 pub struct TripletBatch {
     /// `3 n × 3 × height × width` values.
     pub images: Vec<f32>,
+    /// Width and height.
+    pub size: (usize, usize),
     /// Number of triplets.
     pub n: usize,
 }
@@ -67,7 +69,7 @@ impl<'a> Lessons<'a> {
         let mut images = self.material.changed(self.augmentations, &queries)?;
         images.extend(self.material.plain(&others.0)?);
         images.extend(self.material.plain(&others.1)?);
-        Ok(TripletBatch { images, n: queries.len() })
+        Ok(TripletBatch { images, size: self.material.size(), n: queries.len() })
     }
 
     fn query(&self, number: usize) -> usize {

@@ -6,7 +6,10 @@ use rayon::prelude::*;
 use vpr_core::{Descriptors, Error as CoreError, Poses, map::BlockDigest};
 use vpr_nets::{
     encode::{Preprocessing, registry::Method},
-    model::default::{DefaultEncoder, DefaultEncoderConfig, INPUT},
+    model::{
+        Tunable,
+        default::{DefaultEncoder, DefaultEncoderConfig, INPUT},
+    },
     train::device,
     weights::Weights,
 };
@@ -14,9 +17,12 @@ use vpr_vision::image::{ImageSize, RgbImage};
 
 use crate::{Augmentations, ReferenceSet, Result};
 
-/// References are kept at up to this size, somewhat larger than the network's input, so that a crop
+/// References are kept at up to this size, a quarter larger than the network's input, so that a crop
 /// of them is not blurred.
-const KEPT: ImageSize = ImageSize { width: 160, height: 120 };
+fn kept((width, height): (usize, usize)) -> ImageSize {
+    ImageSize { width: width + width / 4, height: height + height / 4 }
+}
+
 /// Images that are described at a time.
 const BATCH: usize = 32;
 
@@ -26,6 +32,7 @@ pub struct Material {
     images: Vec<RgbImage>,
     poses: Option<Poses>,
     preprocessing: Preprocessing,
+    size: (usize, usize),
 }
 
 /// The default network with these weights, or with those that every clone has, on a device that
@@ -47,14 +54,33 @@ pub fn default_network(weights: Option<&Path>) -> Result<(DefaultEncoder, String
 }
 
 impl Material {
-    /// Decodes the images of a map.
+    /// Decodes the images of a map, for the default network.
     ///
     /// # Errors
     ///
     /// The first file that cannot be read or decoded, by its path.
     pub fn open(set: &ReferenceSet) -> Result<Self> {
-        let preprocessing = Method::find("default", None)?.preprocessing();
-        Ok(Self { images: set.decode(KEPT)?, poses: set.poses().cloned(), preprocessing })
+        Self::open_for(set, Method::find("default", None)?.preprocessing(), INPUT)
+    }
+
+    /// The same for a network with this preprocessing, whose input has this width and height.
+    ///
+    /// # Errors
+    ///
+    /// As [`Self::open`].
+    pub fn open_for(
+        set: &ReferenceSet,
+        preprocessing: Preprocessing,
+        size: (usize, usize),
+    ) -> Result<Self> {
+        let (images, poses) = (set.decode(kept(size))?, set.poses().cloned());
+        Ok(Self { images, poses, preprocessing, size })
+    }
+
+    /// Width and height of the network's input.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize) {
+        self.size
     }
 
     /// Number of references.
@@ -101,11 +127,11 @@ impl Material {
     /// # Errors
     ///
     /// [`CoreError::NotFinite`] if the network gives a number that is none.
-    pub fn describe(&self, network: &DefaultEncoder) -> Result<Descriptors> {
+    pub fn describe<N: Tunable>(&self, network: &N) -> Result<Descriptors> {
         let rows: Vec<usize> = (0..self.len()).collect();
         let mut values = Vec::new();
         for part in rows.chunks(BATCH) {
-            let part = network.describe(&self.plain(part)?, INPUT, BATCH)?;
+            let part = network.rows(&self.plain(part)?, self.size, BATCH)?;
             values.extend_from_slice(part.as_slice());
         }
         descriptors(values, self.len())

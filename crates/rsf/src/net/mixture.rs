@@ -2,8 +2,7 @@
 
 use vpr_core::Error as CoreError;
 use vpr_nets::{
-    model::default::{DefaultEncoder, DefaultEncoderConfig},
-    train::device,
+    model::Tunable,
     weights::{Tensor, Weights},
 };
 
@@ -13,12 +12,18 @@ use crate::Result;
 /// models that are to keep what they knew).
 pub(super) const SHARES: [f32; 3] = [0.25, 0.5, 0.75];
 
-/// The network at this share of the way between two networks. What both agree in stays bit for bit.
+/// The network at this share of the way between two networks like `network`. What both agree in stays
+/// bit for bit.
 ///
 /// # Errors
 ///
 /// [`CoreError::Mismatch`] if a parameter of one is not in the other, or has another number of values.
-pub(super) fn mixed(start: &Weights, end: &Weights, share: f32) -> Result<DefaultEncoder> {
+pub(super) fn mixed<N: Tunable>(
+    mut network: N,
+    start: &Weights,
+    end: &Weights,
+    share: f32,
+) -> Result<N> {
     let between = |(key, end): (&str, &Tensor)| {
         let start = start.get(key).map_or(&[][..], |it| &it.data);
         let (expected, actual) = (end.data.len(), start.len());
@@ -34,7 +39,6 @@ pub(super) fn mixed(start: &Weights, end: &Weights, share: f32) -> Result<Defaul
         let data = values.next()?;
         Some((key, Tensor { shape: tensor.shape, data }))
     });
-    let mut network = DefaultEncoderConfig::new().init(&device());
     weights.apply(&mut network)?;
     Ok(network)
 }

@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use vpr_core::Descriptors;
-use vpr_nets::model::default::{DefaultEncoder, INPUT};
+use vpr_nets::model::Tunable;
 
 use super::{Material, material::descriptors};
 use crate::{Augmentations, MiningParams, Result};
@@ -19,6 +19,8 @@ pub struct Trial {
     /// The reference that each shows, and its input.
     of: Vec<usize>,
     images: Vec<f32>,
+    /// Width and height of an input.
+    size: (usize, usize),
     /// References of the same place, for each query.
     correct: Vec<Vec<usize>>,
 }
@@ -63,7 +65,7 @@ impl Trial {
             }
         };
         let correct = of.iter().map(|&row| same(row)).collect();
-        Ok(Self { of, images, correct })
+        Ok(Self { of, images, size: material.size(), correct })
     }
 
     /// The reference that each variant shows.
@@ -83,11 +85,11 @@ impl Trial {
     /// # Errors
     ///
     /// [`vpr_core::Error::NotFinite`] if the network gives numbers that are none.
-    pub fn describe(&self, network: &DefaultEncoder) -> Result<Descriptors> {
-        let each = 3 * INPUT.0 * INPUT.1;
+    pub fn describe<N: Tunable>(&self, network: &N) -> Result<Descriptors> {
+        let each = 3 * self.size.0 * self.size.1;
         let mut values = Vec::new();
         for part in self.images.chunks(each * BATCH) {
-            values.extend_from_slice(network.describe(part, INPUT, BATCH)?.as_slice());
+            values.extend_from_slice(network.rows(part, self.size, BATCH)?.as_slice());
         }
         descriptors(values, self.of.len())
     }
@@ -97,7 +99,7 @@ impl Trial {
     /// # Errors
     ///
     /// [`vpr_core::Error::NotFinite`] if it gives numbers that are none.
-    pub fn score(&self, network: &DefaultEncoder, references: &Descriptors) -> Result<Score> {
+    pub fn score<N: Tunable>(&self, network: &N, references: &Descriptors) -> Result<Score> {
         let n = self.of.len();
         let rows = self.describe(network)?;
         let (mut hits, mut sum, mut n_compared) = (0_usize, 0.0, 0_usize);

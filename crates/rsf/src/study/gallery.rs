@@ -125,7 +125,7 @@ fn change(a: &RgbImage, b: &RgbImage) -> f64 {
 }
 
 /// The image as a file of the cache, named by what it shows.
-fn kept(image: &RgbImage, sources: &Sources<'_>) -> Result<PathBuf> {
+pub(super) fn kept(image: &RgbImage, sources: &Sources<'_>) -> Result<PathBuf> {
     let folder = sources.cache().join("rsf-augmented");
     fs::create_dir_all(&folder).map_err(CoreError::io(&folder))?;
     let path = folder.join(format!("{}.png", BlockDigest::of(image.as_slice()).to_hex()));

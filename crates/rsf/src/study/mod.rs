@@ -1,12 +1,14 @@
 //! What an experiment file of chapter 4 can ask for, one file per study.
 
 mod adapted;
+mod attention;
 mod embedding;
 mod gallery;
 mod gaps;
 mod place;
 mod prediction;
 mod recalls;
+mod tuned;
 
 use serde::Deserialize;
 use vpr_report::{experiment::Experiment, page::Report};
@@ -58,6 +60,13 @@ pub enum Study {
         /// Rows.
         places: Vec<Place>,
         /// Which network is adapted.
+        encoder: Encoder,
+    },
+    /// Where the learned queries of `BoQ` look before and after an adaptation: figure 4.5.
+    Attention {
+        /// Rows.
+        places: Vec<Place>,
+        /// Which network is adapted: one of `boq-default`.
         encoder: Encoder,
     },
     /// Sizes of the places, and how far they are from the training domain: table 4.2.
@@ -175,6 +184,9 @@ pub fn run(experiment: &Experiment<Study>, sources: &Sources<'_>) -> Result<Repo
         }
         Study::Found { places, encoder } => {
             sheet = gallery::found(&mut table, places, encoder, sources)?;
+        }
+        Study::Attention { places, encoder } => {
+            sheet = attention::attention(&mut table, places, encoder, sources)?;
         }
         Study::Gaps { training, places } => gaps::run(&mut table, training, places, sources)?,
     }

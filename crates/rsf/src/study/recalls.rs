@@ -21,7 +21,7 @@ use vpr_nets::{
 use vpr_report::table::{Cell, Table};
 use vpr_study::{Direction, Network, Runner, Sources, technique::Found};
 
-use super::{Adapted, Encoder, Place};
+use super::{Adapted, Encoder, Place, tuned::tuned_now};
 use crate::{
     Result,
     net::{Finetuning, Material, Whitening, default_network, finetune, last, run_log, whiten},
@@ -175,8 +175,12 @@ fn runner(
     seed: Option<u64>,
     sources: &Sources<'_>,
 ) -> Result<Result<Runner, String>> {
-    if encoder.method != "default" {
+    let is_default = encoder.method == "default";
+    if !is_default && encoder.weights.is_none() && encoder.tuned.is_none() {
         return of_another(place, encoder, seed, sources);
+    }
+    if let Found::Absent(why) = sources.find(&encoder.method)? {
+        return Ok(Err(why));
     }
     let path = match encoder.weights_for(place, seed) {
         None => adapted_now(place, encoder, seed, sources)?,
@@ -187,10 +191,10 @@ fn runner(
             Some(path)
         }
     };
-    let network = by_name("default", path.as_deref(), &sources.roots().roots)?;
+    let network = by_name(&encoder.method, path.as_deref(), &sources.roots().roots)?;
     Ok(Ok(Runner {
         name: encoder.name.clone(),
-        column: "default network",
+        column: if is_default { "default network" } else { "network" },
         encoder: encoder.name.clone(),
         technique: Arc::new(Network::new(network.into())),
     }))
@@ -229,6 +233,10 @@ pub(super) fn adapted_now(
     }
     let Some(set) = encoder.learned_from(place).references(sources)? else { return Ok(None) };
     let set = if encoder.without_poses { set.without_poses() } else { set };
+    if encoder.method != "default" {
+        let Some(settings) = encoder.finetuning(seed) else { return Ok(None) };
+        return Ok(Some(tuned_now(&encoder.method, &settings, &set, sources)?));
+    }
     let material = Material::open(&set)?;
     let start = match &encoder.from {
         None => None,

@@ -14,6 +14,7 @@ pub mod registry;
 mod run;
 mod stamps;
 mod to_map;
+mod tuning;
 
 pub use batches::{BatchLeak, batch_leak};
 pub use encoder::Encoder;
@@ -21,3 +22,4 @@ pub use network::{Network, Request, by_name, by_request};
 pub use preprocessing::{Channels, Interpolation, Preprocessing, Size};
 pub use run::{Encoded, Options, encode_each, encode_files, encode_images};
 pub use to_map::{Images, Written, encode_to_map};
+pub use tuning::{Start, Task, tune};

@@ -8,7 +8,8 @@ use burn::{
 use crate::{
     Result,
     backbone::{MobileNetV2, MobileNetV2Config, mobilenet_v2},
-    weights::Weights,
+    model::{Describe, Tunable},
+    weights::{Report, Weights},
 };
 
 /// Clusters of the shipped weights.
@@ -38,8 +39,11 @@ impl NetVladMobile {
         }
     }
 
-    /// The weights of its file under its own keys.
-    pub(super) fn keys(weights: Weights) -> Result<Weights> {
+    /// The weights of its file, or of one that was trained further here, under its own keys.
+    fn keys(weights: Weights) -> Result<Weights> {
+        if weights.get("centres").is_some() {
+            return Ok(weights);
+        }
         let head = weights.mapped(|key, mut weight| {
             if key.starts_with("net_vlad_layer_1.") {
                 weight.shape.retain(|&side| side != 1);
@@ -64,6 +68,18 @@ impl NetVladMobile {
         let sums = features.matmul(assignment) + self.centres.val().unsqueeze::<3>() * mass;
         let flat = keras_l2_normalize(sums).swap_dims(1, 2).flatten::<2>(1, 2);
         keras_l2_normalize(flat)
+    }
+}
+
+impl Describe for NetVladMobile {
+    fn describe(&self, images: Tensor<4>) -> Tensor<2> {
+        self.forward(images)
+    }
+}
+
+impl Tunable for NetVladMobile {
+    fn take(&mut self, weights: Weights) -> Result<Report> {
+        Self::keys(weights)?.apply(self)
     }
 }
 

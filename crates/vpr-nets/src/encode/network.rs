@@ -21,8 +21,9 @@ use crate::{
     backbone::{EfficientNetLite0Config, efficientnet_lite},
     device::{DeviceChoice, computed},
     model::{
-        self, Model,
+        self, Model, Tunable,
         default::{DefaultEncoder, DefaultEncoderConfig},
+        headed::{BoqDefault, SaladDefault},
     },
     weights::{self, Fitted, Weights},
 };
@@ -175,10 +176,10 @@ fn ready(
             let network = DefaultEncoderConfig::new().init(device);
             assembled(network, weights, &[], DefaultEncoder::forward)?
         }
+        Architecture::BoqDefault => tunable(BoqDefault::init(device), weights)?,
+        Architecture::SaladDefault => tunable(SaladDefault::init(device), weights)?,
         Architecture::NetVladMobileNetV2 => {
-            let network = NetVladMobile::new(n_channels, device);
-            let weights = NetVladMobile::keys(weights)?;
-            assembled(network, weights, &[], NetVladMobile::forward)?
+            tunable(NetVladMobile::new(n_channels, device), weights)?
         }
         Architecture::EfficientNetLite0 => efficientnet_lite0(weights, device)?,
         Architecture::BoqDinov2 => published(model::boq_dinov2(weights, device)?),
@@ -224,6 +225,17 @@ where
         dimension: None,
         digest: report.digest,
         forward: Box::new(move |images| forward(&module, images)),
+        accepts: Box::new(|_, _| Ok(())),
+    })
+}
+
+/// A network that knows how to take its weights.
+fn tunable<N: Tunable + Send + Sync + 'static>(mut network: N, weights: Weights) -> Result<Ready> {
+    let report = network.take(weights)?;
+    Ok(Ready {
+        dimension: None,
+        digest: report.digest,
+        forward: Box::new(move |images| network.describe(images)),
         accepts: Box::new(|_, _| Ok(())),
     })
 }

@@ -80,6 +80,10 @@ pub struct Method {
 pub enum Architecture {
     /// The small network this project trains.
     Default,
+    /// `BoQ` on the trunk of the default network.
+    BoqDefault,
+    /// SALAD on the trunk of the default network.
+    SaladDefault,
     /// NetVLAD on ten blocks of MobileNetV2.
     NetVladMobileNetV2,
     /// The mean of EfficientNet-Lite0's feature map.

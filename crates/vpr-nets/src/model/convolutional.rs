@@ -129,7 +129,12 @@ pub fn cosplace(weights: Weights, device: &Device) -> Result<Loaded<Parts<Trunk,
         [(r"^aggregation\.1\.p$", "aggregator.gem.p"), (r"^aggregation\.3\.", "aggregator.fc.")];
     let weights = weights.renamed(&head)?;
     // VGG16 begins with a 3×3 convolution, a ResNet with one of 7×7.
-    let (weights, backbone) = if Shapes::new(&weights, "").axis("backbone.0.weight", 2)? == 3 {
+    let shapes = Shapes::new(&weights, "");
+    // What was trained further here has names of its own.
+    let is_ours = shapes.has("backbone.conv1.weight");
+    let (weights, backbone) = if shapes.has("backbone.features.0.weight")
+        || (!is_ours && shapes.axis("backbone.0.weight", 2)? == 3)
+    {
         let network = Vgg16Config::new().with_crop(Crop::Conv5).init(device);
         (weights.renamed(&SEQUENTIAL_VGG)?, Trunk::Vgg16(network))
     } else {

@@ -17,6 +17,7 @@ use burn::{
 use ndarray::Array2;
 use vpr_core::{Descriptors, Error, Result};
 
+use super::Describe;
 use crate::{
     layer::{Conv2d, Conv2dConfig, group_norm, l2_normalize_rows, linear, standardize},
     loss::SupervisedContrastive,
@@ -236,6 +237,12 @@ impl DefaultEncoder {
     }
 }
 
+impl Describe for DefaultEncoder {
+    fn describe(&self, images: Tensor<4>) -> Tensor<2> {
+        self.forward(images)
+    }
+}
+
 impl Trainable for DefaultEncoder {
     fn loss(&self, images: Tensor<4>, places: &[usize]) -> Tensor<1> {
         SupervisedContrastive::default().forward(self.forward(images), places)
@@ -250,9 +257,21 @@ impl Trunk {
     /// mean 0 and variance 1.
     #[must_use]
     pub fn forward(&self, images: Tensor<4>) -> Tensor<2> {
+        adaptive_avg_pool2d(self.reduce.forward(self.last_map(images)), GRID).flatten(1, 3)
+    }
+
+    /// Its last map, which [`Self::forward`] reduces and pools: `batch × channels × height / 16 ×
+    /// width / 16`, none below zero.
+    #[must_use]
+    pub fn last_map(&self, images: Tensor<4>) -> Tensor<4> {
         let map = relu(self.stem.forward(standardize(images, 1e-4)));
-        let map = self.stages.iter().fold(map, |map, stage| stage.forward(map));
-        adaptive_avg_pool2d(self.reduce.forward(map), GRID).flatten(1, 3)
+        self.stages.iter().fold(map, |map, stage| stage.forward(map))
+    }
+
+    /// Channels of [`Self::last_map`].
+    #[must_use]
+    pub fn channels(&self) -> usize {
+        self.reduce.weight.dims()[1]
     }
 }
 
@@ -293,7 +312,7 @@ impl Unit {
 }
 
 /// What `forward` makes of images, a batch at a time.
-fn rows(
+pub(super) fn rows(
     images: &[f32],
     size: (usize, usize),
     batch: usize,

@@ -2,9 +2,11 @@
 
 mod convolutional;
 pub mod default;
+pub mod headed;
 mod keys;
 mod netvlad;
 mod transformer;
+mod tunable;
 
 use burn::module::Module;
 use burn::store::ModuleSnapshot;
@@ -17,6 +19,7 @@ pub use convolutional::{Trunk, ap_gem, boq_resnet50, convap, cosplace, gem_resne
 pub use keys::SEQUENTIAL_RESNET;
 pub use netvlad::{NetVladHead, netvlad};
 pub use transformer::{boq_dinov2, cricavpr, salad};
+pub use tunable::Tunable;
 
 /// From images to descriptors.
 pub trait Describe {
@@ -67,6 +70,14 @@ pub trait Model: Describe + Send + Sync {
 
     /// What was loaded.
     fn report(&self) -> &Report;
+}
+
+impl<M> Loaded<M> {
+    /// The network alone, such as to train it further.
+    #[must_use]
+    pub fn into_network(self) -> M {
+        self.network
+    }
 }
 
 impl<M: Describe> Describe for Loaded<M> {

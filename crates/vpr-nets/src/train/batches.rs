@@ -24,6 +24,19 @@ pub struct Arrangement {
     pub avenues: usize,
 }
 
+/// One image of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chosen {
+    /// Its album.
+    pub album: usize,
+    /// Its number there.
+    pub image: usize,
+    /// Which of the step's places it shows.
+    pub place: usize,
+    /// Decides how it is changed.
+    pub seed: u64,
+}
+
 /// How many images a step sees.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
@@ -128,10 +141,9 @@ impl Batches {
         &self.albums
     }
 
-    /// The batch of a step: `places × views` images, those of a place beside each other.
+    /// The images of a step: `places × views`, those of a place beside each other.
     #[must_use]
-    pub fn get(&self, step: usize) -> Batch {
-        let size = self.sizes.input;
+    pub fn chosen(&self, step: usize) -> Vec<Chosen> {
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
         random.set_stream(step as u64 + 1);
         let mut order: Vec<usize> = (0..self.albums.len()).collect();
@@ -144,17 +156,25 @@ impl Batches {
                 let mut views: Vec<usize> = (0..visits).collect();
                 views.shuffle(&mut random);
                 for view in views.into_iter().take(self.sizes.views) {
-                    chosen.push((album, place * visits + view, number, random.random::<u64>()));
+                    let (image, seed) = (place * visits + view, random.random::<u64>());
+                    chosen.push(Chosen { album, image, place: number, seed });
                 }
                 number += 1;
             }
         }
+        chosen
+    }
+
+    /// The batch of a step: the images of [`Self::chosen`], changed.
+    #[must_use]
+    pub fn get(&self, step: usize) -> Batch {
+        let (size, chosen) = (self.sizes.input, self.chosen(step));
         let each = 3 * size.0 * size.1;
         let mut images = vec![0.0; each * chosen.len()];
-        images.par_chunks_mut(each).zip(&chosen).for_each(|(output, &(album, image, _, seed))| {
-            augment(self.albums[album].get(image), size, seed, output);
+        images.par_chunks_mut(each).zip(&chosen).for_each(|(output, it)| {
+            augment(self.albums[it.album].get(it.image), size, it.seed, output);
         });
-        Batch { images, size, places: chosen.iter().map(|&(_, _, place, _)| place).collect() }
+        Batch { images, size, places: chosen.iter().map(|it| it.place).collect() }
     }
 }
 

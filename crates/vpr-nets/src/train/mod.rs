@@ -19,7 +19,7 @@ mod seed;
 mod whitening;
 
 pub use augment::augment;
-pub use batches::{Arrangement, Batches, Sizes, variants};
+pub use batches::{Arrangement, Batches, Chosen, Sizes, variants};
 pub use checkpoint::Checkpoint;
 pub use descent::{Batch, Descent, Learner, Report, Trainable};
 pub use log::Log;

@@ -33,7 +33,8 @@ pub fn save<M: ModuleSnapshot>(
     precision: Precision,
 ) -> Result<()> {
     let refused = |cause: String| Error::format(path, "weights", cause);
-    let store = SafetensorsStore::from_bytes(None);
+    // Names of enum variants are not part of any key, as where weights are read.
+    let store = SafetensorsStore::from_bytes(None).skip_enum_variants(true);
     let store = match precision {
         Precision::Single => store.with_to_adapter(BurnToPyTorchAdapter),
         Precision::Half => {
