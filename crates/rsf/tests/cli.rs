@@ -24,7 +24,8 @@ fn place(seed: usize) -> TempDir {
         for number in 0..6 {
             let name = format!("@{}@{}@32@N@.png", 500_000 + 40 * number + shift, 4_000_000);
             let changed = if side == "queries" { seed } else { 0 };
-            let image = if changed == NOISE { noise(number) } else { blocks(number + 100 * changed) };
+            let image =
+                if changed == NOISE { noise(number) } else { blocks(number + 100 * changed) };
             write_png(&image, &folder.path().join(side).join(name)).unwrap();
         }
     }
@@ -44,7 +45,8 @@ fn blocks(number: usize) -> image::RgbImage {
 fn noise(number: usize) -> image::RgbImage {
     let mut state = 1 + number as u64;
     let byte = |_| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         state.to_be_bytes()[0]
     };
     from_pixels(ImageSize { width: 40, height: 30 }, (0..3 * 40 * 30).map(byte).collect())

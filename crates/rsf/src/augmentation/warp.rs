@@ -46,8 +46,7 @@ pub(super) fn warp(image: &RgbImage, matrix: &Matrix3<f64>, corners: Corners) ->
     let mut pixels = Vec::with_capacity(3 * width * height);
     for row in 0..height {
         for column in 0..width {
-            let (x, y) =
-                (corners.asked(column as f64, width), corners.asked(row as f64, height));
+            let (x, y) = (corners.asked(column as f64, width), corners.asked(row as f64, height));
             let from = inverse * Vector3::new(x, y, 1.0);
             let x = corners.sampled(from.x / from.z, width);
             let y = corners.sampled(from.y / from.z, height);

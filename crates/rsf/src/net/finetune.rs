@@ -145,10 +145,13 @@ impl Finetuning {
             ("batch", format!("{} triplets", self.batch)),
             ("rate", self.rate.to_string()),
             ("margin", self.margin.to_string()),
-            ("parts", match self.parts {
-                Parts::LowRank => format!("{}, rank {}", self.parts.key(), self.rank),
-                parts => parts.key().to_owned(),
-            }),
+            (
+                "parts",
+                match self.parts {
+                    Parts::LowRank => format!("{}, rank {}", self.parts.key(), self.rank),
+                    parts => parts.key().to_owned(),
+                },
+            ),
             ("frozen", self.frozen.join(" ")),
             ("seed", self.seed.to_string()),
             ("licence", "MIT OR Apache-2.0".to_owned()),
@@ -191,8 +194,7 @@ impl Finetuning {
 
     /// The network as it learns.
     fn student(&self, network: DefaultEncoder) -> Result<Student> {
-        let (network, frozen) =
-            self.parts.prepare(network, &self.frozen, self.rank, self.seed)?;
+        let (network, frozen) = self.parts.prepare(network, &self.frozen, self.rank, self.seed)?;
         Student::new(network, self.margin, &frozen)
     }
 
@@ -200,7 +202,11 @@ impl Finetuning {
         let Some(poses) = material.poses() else {
             return Mined::without_poses(material.len(), &split.training);
         };
-        self.mining.with_poses(&material.describe(&merged(student.network()))?, poses, &split.training)
+        self.mining.with_poses(
+            &material.describe(&merged(student.network()))?,
+            poses,
+            &split.training,
+        )
     }
 }
 

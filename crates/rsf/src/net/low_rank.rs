@@ -9,8 +9,8 @@ use rand_chacha::ChaCha8Rng;
 
 /// Gives matrices an update; a kernel of a convolution is one with a row for each of its outputs.
 ///
-/// `A` is drawn, uniform with rows of length one in the mean, and `B` begins as zero, so that the
-/// network begins as it was.
+/// The factor on the side of the inputs is drawn, uniform with vectors of length one in the mean, and
+/// the other begins as zero, so that the network begins as it was.
 pub(super) struct LowRank {
     matrices: Vec<String>,
     rank: usize,
@@ -39,14 +39,22 @@ impl Reparameterizer for LowRank {
         let (dims, device) = (base.dims(), base.device());
         let (rows, columns) = (dims[0], dims[1..].iter().product::<usize>());
         let rank = self.rank.min(rows).min(columns);
-        let reach = (3.0 / rank as f32).sqrt();
-        let drawn = (0..rows * rank).map(|_| reach * (2.0 * self.random.random::<f32>() - 1.0));
-        let a = TensorData::new(drawn.collect::<Vec<f32>>(), [rows, rank]);
-        let adapter = LoraAdapter {
-            a: Param::from_tensor(Tensor::from_data(a, &device)),
-            b: Param::from_tensor(Tensor::zeros([rank, columns], &device)),
-            scale: 1.0,
+        // A layer's matrix has its inputs as rows, a convolution as columns.
+        let n_inputs = if D == 2 { rows } else { columns };
+        let reach = (3.0 / n_inputs as f32).sqrt();
+        let random = &mut self.random;
+        let drawn = (0..rank * n_inputs).map(|_| reach * (2.0 * random.random::<f32>() - 1.0));
+        let drawn: Vec<f32> = drawn.collect();
+        let (a, b) = if D == 2 {
+            (drawn, vec![0.0; rank * columns])
+        } else {
+            (vec![0.0; rows * rank], drawn)
         };
+        let factor = |values: Vec<f32>, shape: [usize; 2]| {
+            Param::from_tensor(Tensor::from_data(TensorData::new(values, shape), &device))
+        };
+        let (a, b) = (factor(a, [rows, rank]), factor(b, [rank, columns]));
+        let adapter = LoraAdapter { a, b, scale: 1.0 };
         (param, Some(adapter))
     }
 }

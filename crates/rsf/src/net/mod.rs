@@ -18,6 +18,6 @@ pub use material::{Material, default_network};
 pub use parts::Parts;
 pub use student::Student;
 pub use trial::{Score, Trial};
+pub use whitening::{Whitening, projected, whiten};
 #[cfg(feature = "study")]
 pub(crate) use whitening::{features, pooled_features, projection};
-pub use whitening::{Whitening, projected, whiten};

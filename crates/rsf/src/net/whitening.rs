@@ -23,9 +23,9 @@ const NOTHING: f64 = 1e-9;
 /// References, and their variants by reference and seed.
 type Batch = (Vec<usize>, Vec<(usize, u64)>);
 
-/// How the projection is fitted. `prior` and `ridge` are those, of twenty pairs, after which recall
-/// was highest on generated places of other seeds than the chapter's (`rsf run
-/// experiments/table-4.3-choice.toml`).
+/// How the projection is fitted. `prior` and `ridge` were chosen among twenty pairs by recall on
+/// generated places of other seeds than the chapter's; `experiments/table-4.3-choice.toml` does it
+/// on five such places, where a ridge of 3 is higher by two queries of 600 (`docs/parity.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Whitening {
