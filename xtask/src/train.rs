@@ -259,10 +259,11 @@ mod tests {
         assert_eq!(replaced(&words, &[]), words);
     }
 
-    /// Every file of weights of chapter 6 has a name under which it is trained again, and is small.
+    /// Every file of weights of chapters 4 and 6 has a name under which it is trained again, and is
+    /// small; in chapter 4 the name is that of its map.
     #[test]
-    fn weights_of_chapter_6_have_a_training() {
-        let mut n = 0;
+    fn weights_of_chapters_4_and_6_have_a_training() {
+        let (mut n, mut n_adapted) = (0, 0);
         for entry in fs::read_dir(workspace_root().unwrap().join("data/models")).unwrap() {
             let path = entry.unwrap().path();
             let name = path.file_name().unwrap().to_str().unwrap();
@@ -273,8 +274,15 @@ mod tests {
                 assert!(path.with_extension("log.csv").is_file(), "{name} has no log");
                 assert!(fs::metadata(&path).unwrap().len() <= 4 << 20, "{name} is large");
                 n += 1;
+            } else if let Some(rest) = stem.strip_prefix("rsf-") {
+                let place = rest.split('-').next().unwrap();
+                let network = Network::from_str(&format!("rsf-{place}"), false).unwrap();
+                assert_eq!(command(network), ("rsf", [&RSF[..], &[place]].concat()));
+                let log = path.with_extension("log.csv");
+                assert!(log.is_file() || rest.ends_with("-whitened"), "{name} has no log");
+                n_adapted += 1;
             }
         }
-        assert!(n >= 9, "{n} files");
+        assert!(n >= 9 && n_adapted >= 16, "{n} and {n_adapted} files");
     }
 }

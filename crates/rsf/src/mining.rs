@@ -55,6 +55,13 @@ pub struct Mined {
 }
 
 impl MiningParams {
+    /// The same distances where a metre is so many metres.
+    #[must_use]
+    pub fn scaled(self, scale: f64) -> Self {
+        let (positive_m, negative_m) = (scale * self.positive_m, scale * self.negative_m);
+        Self { positive_m, negative_m, ..self }
+    }
+
     /// Checks the numbers.
     ///
     /// # Errors

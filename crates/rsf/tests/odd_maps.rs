@@ -154,19 +154,62 @@ fn kill_after(mut child: Child, log: &Path, wait: Duration) {
 
 #[test]
 fn a_killed_process_goes_on_to_the_same_bits() {
-    let [whole, killed] = [map(&different(6), 40), map(&different(6), 40)];
-    let output = tune(whole.path(), &["--steps=20"]);
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let log = killed.path().join("tuned.log.csv");
-    for wait in [0, 130, 310] {
-        let mut command = command(killed.path(), &[&FEW[..], &["--steps=20"]].concat());
-        let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        kill_after(child, &log, Duration::from_millis(wait));
+    let parts: [&[&str]; 2] = [&["--steps=20"], &["--steps=20", "--parts=low-rank"]];
+    for more in parts {
+        let [whole, killed] = [map(&different(6), 40), map(&different(6), 40)];
+        let output = tune(whole.path(), more);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let log = killed.path().join("tuned.log.csv");
+        // Between two of its steps, in one, while a checkpoint is written: wherever it is by then.
+        for wait in [0, 40, 130, 220, 310] {
+            let mut command = command(killed.path(), &[&FEW[..], more].concat());
+            let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+            kill_after(child, &log, Duration::from_millis(wait));
+        }
+        let output = tune(killed.path(), more);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        for name in ["tuned.safetensors", "tuned.log.csv"] {
+            let read = |folder: &TempDir| fs::read(folder.path().join(name)).unwrap();
+            assert!(read(&whole) == read(&killed), "{name}");
+        }
     }
-    let output = tune(killed.path(), &["--steps=20"]);
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    for name in ["tuned.safetensors", "tuned.log.csv"] {
-        let read = |folder: &TempDir| fs::read(folder.path().join(name)).unwrap();
-        assert!(read(&whole) == read(&killed), "{name}");
+}
+
+fn gap(folder: &Path) -> Output {
+    let training = "world/street?places=6&camera.width=64&camera.height=48&camera.focal=46.0";
+    command(folder, &["gap", "--database-folder", "database", "--training", training])
+        .output()
+        .unwrap()
+}
+
+/// A projection and the gap meter on what is odd: they need no negatives, so one place is enough.
+#[test]
+fn odd_maps_are_measured_and_whitened_or_refused() {
+    let pixel: DynamicImage = RgbImage::from_pixel(1, 1, Rgb([90, 80, 70])).into();
+    let rgba: DynamicImage = DynamicImage::from(blocks(2)).to_rgba8().into();
+    let grey: DynamicImage = DynamicImage::from(blocks(1)).to_luma8().into();
+    for (images, metres) in [
+        (different(3), 40),
+        (different(4), 1),
+        (vec![blocks(7).into(); 4], 40),
+        (vec![pixel, rgba, grey, blocks(3).into()], 40),
+    ] {
+        let place = map(&images, metres);
+        for output in [tune_whitening(place.path()), gap(place.path())] {
+            assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+            let text = String::from_utf8_lossy(&output.stdout).to_lowercase();
+            assert!(!text.contains("nan"), "{text}");
+        }
+    }
+    let one = map(&different(1), 40);
+    let broken = map(&different(4), 40);
+    let name = "@500200@4000000@32@N@9.png";
+    fs::write(broken.path().join("database").join(name), "no image").unwrap();
+    for (folder, part) in [(&one, "1 references: at least 2"), (&broken, name)] {
+        for output in [tune_whitening(folder.path()), gap(folder.path())] {
+            assert_eq!(output.status.code(), Some(2));
+            assert!(stderr(&output).contains(part), "{}", stderr(&output));
+        }
+        assert!(!folder.path().join("w.safetensors").exists());
     }
 }

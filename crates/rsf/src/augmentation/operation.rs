@@ -163,11 +163,11 @@ impl Operation {
         let [right, bottom] = [size.0, size.1].map(|it| it as f64 - 1.0);
         match *self {
             Self::Perspective { start, end } => {
-                warp::warp(image, &warp::perspective(&start, &end)?, Corners::Free)
+                warp::warp(image, &warp::perspective(&start, &end)?, Corners::Stretched)
             }
             Self::Affine { translation, scale, degrees, shear } => {
                 let matrix = warp::affine(size, translation, scale, degrees, shear);
-                warp::warp(image, &matrix, Corners::Free)
+                warp::warp(image, &matrix, Corners::Centred)
             }
             Self::Rotation { degrees } => {
                 let matrix = warp::about([right / 2.0, bottom / 2.0], [1.0; 2], degrees);

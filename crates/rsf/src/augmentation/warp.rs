@@ -3,34 +3,53 @@
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use vpr_vision::image::{RgbImage, from_pixels};
 
-/// How positions between pixels are counted, Kornia's `align_corners`.
+/// How positions between pixels are counted.
 ///
-/// Kornia normalises pixels of a matrix by `width − 1` whatever the flag says. Without it, the
-/// sampler then takes the same numbers to mean `width` pixels: everything is stretched by
-/// `width / (width − 1)` and moved by half a pixel. Perspective and affine are sampled so by
-/// default, rotations and crops are not; we do as Kornia up to 0.8 does for perspectives. For affine
-/// maps its grid is that of pixels' centres, so that nothing is stretched there: a known miss.
+/// Kornia normalises pixels of a matrix by `width − 1` whatever `align_corners` says. Without that
+/// flag, which is the default of perspectives and affine maps, its sampler takes the same numbers to
+/// mean `width` pixels. Affine maps start from pixels counted in the sampler's way, perspectives (up
+/// to Kornia 0.8) from pixels counted in the matrix's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Corners {
-    /// Rotations and crops.
+    /// Rotations and crops: pixels are where they are.
     Aligned,
-    /// Perspective and affine.
-    Free,
+    /// Perspectives: all is stretched by `width / (width − 1)` and moved by half a pixel.
+    Stretched,
+    /// Affine maps: the map is taken of pixels that are stretched so, which is undone before.
+    Centred,
+}
+
+impl Corners {
+    /// Where the matrix takes a pixel of the result to be.
+    fn asked(self, at: f64, side: usize) -> f64 {
+        match self {
+            Self::Centred if side > 1 => (at + 0.5) * (side as f64 - 1.0) / side as f64,
+            _ => at,
+        }
+    }
+
+    /// Where the sampler looks for what the matrix says.
+    fn sampled(self, at: f64, side: usize) -> f64 {
+        match self {
+            Self::Stretched | Self::Centred if side > 1 => {
+                at * side as f64 / (side as f64 - 1.0) - 0.5
+            }
+            _ => at,
+        }
+    }
 }
 
 /// The image under `matrix`, which takes its pixels to those of the result; bilinear, black outside.
 pub(super) fn warp(image: &RgbImage, matrix: &Matrix3<f64>, corners: Corners) -> Option<RgbImage> {
     let inverse = matrix.try_inverse()?;
     let (width, height) = (image.width(), image.height());
-    let sampled = |at: f64, side: usize| match corners {
-        Corners::Free if side > 1 => at * side as f64 / (side as f64 - 1.0) - 0.5,
-        _ => at,
-    };
     let mut pixels = Vec::with_capacity(3 * width * height);
     for row in 0..height {
         for column in 0..width {
-            let from = inverse * Vector3::new(column as f64, row as f64, 1.0);
-            let (x, y) = (sampled(from.x / from.z, width), sampled(from.y / from.z, height));
+            let (x, y) = (corners.asked(column as f64, width), corners.asked(row as f64, height));
+            let from = inverse * Vector3::new(x, y, 1.0);
+            let x = corners.sampled(from.x / from.z, width);
+            let y = corners.sampled(from.y / from.z, height);
             pixels.extend(bilinear(image, x, y));
         }
     }

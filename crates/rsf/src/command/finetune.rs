@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::ensure;
 use rsf::{
     MiningParams, Preset,
-    net::{Finetuning, Whitening},
+    net::{Finetuning, Parts, Whitening},
 };
 use vpr_nets::weights::Precision;
 use vpr_report::cli::{Outcome, ReportArgs};
@@ -34,7 +34,7 @@ pub(crate) struct FinetuneArgs {
     #[arg(long, value_name = "DIR")]
     checkpoints: Option<PathBuf>,
     /// Only fit another projection in closed form, beside the old one: seconds, and the trunk stays
-    #[arg(long, conflicts_with_all = ["steps", "rate", "margin", "batch", "frozen"])]
+    #[arg(long, conflicts_with_all = ["steps", "rate", "margin", "batch", "parts", "rank", "frozen"])]
     whitening: bool,
     /// Share of the old projection that --whitening keeps, from 0 to below 1
     #[arg(long, default_value_t = Whitening::default().prior, requires = "whitening")]
@@ -69,7 +69,13 @@ pub(crate) struct FinetuneArgs {
     /// Hard negatives are drawn from so many that look most alike
     #[arg(long, default_value_t = MiningParams::default().hardest, value_name = "N")]
     hardest: usize,
-    /// Parts of the network that stay, such as `trunk.stem`
+    /// What of the network learns
+    #[arg(long, value_enum, default_value_t, value_name = "NAME")]
+    parts: Parts,
+    /// Rank of the updates of `--parts low-rank`
+    #[arg(long, default_value_t = Finetuning::default().rank, value_name = "N")]
+    rank: usize,
+    /// Parts of the network that stay besides, such as `trunk.stem`
     #[arg(long, value_name = "PART", num_args = 1.., value_delimiter = ',')]
     frozen: Vec<String>,
     /// Share of references that are held out to say when it is best
@@ -127,6 +133,8 @@ impl FinetuneArgs {
             },
             augmentations: self.augmentations,
             held_out: self.held_out,
+            parts: self.parts,
+            rank: self.rank,
             frozen: self.frozen.clone(),
             seed: self.seed,
             ..Finetuning::default()

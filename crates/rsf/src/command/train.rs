@@ -100,3 +100,34 @@ fn adapt(
         _ => bail!("`{}`: either `tuned` or `whitened`", encoder.name),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    /// The experiments that `cargo xtask train rsf-…` has say how each committed file comes about,
+    /// and name no other.
+    #[test]
+    fn committed_weights_are_those_that_experiments_name() {
+        let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let mut named = BTreeSet::new();
+        for id in ["table-4.3", "table-4.5", "table-4.6"] {
+            let path = workspace.join("experiments").join(id).with_added_extension("toml");
+            let experiment = experiment::load::<Study>(&path).unwrap();
+            let Study::Recalls { places, encoders, .. } = &experiment.study else { continue };
+            for place in places {
+                named.extend(encoders.iter().filter_map(|encoder| of_place(encoder, place)));
+            }
+        }
+        let mut there = BTreeSet::new();
+        for entry in fs::read_dir(workspace.join("data/models")).unwrap() {
+            let name = entry.unwrap().file_name().into_string().unwrap();
+            if name.starts_with("rsf-") && name.ends_with(".safetensors") {
+                there.insert(format!("models/{name}"));
+            }
+        }
+        assert_eq!(named, there);
+    }
+}

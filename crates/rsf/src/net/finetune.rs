@@ -17,8 +17,9 @@ use vpr_nets::{
 };
 
 use super::{
-    Lessons, Material, Score, Student, Trial,
+    Lessons, Material, Parts, Score, Student, Trial,
     mixture::{SHARES, mixed},
+    parts::merged,
 };
 use crate::{Augmentations, Mined, MiningParams, Preset, ReferenceSet, Result, Split};
 
@@ -60,7 +61,11 @@ pub struct Finetuning {
     pub held_out: f64,
     /// Variants of each of them.
     pub variants: usize,
-    /// Parts of the network that stay as they are, by the names of its parameters.
+    /// What of the network learns.
+    pub parts: Parts,
+    /// Rank of its updates, where they have one.
+    pub rank: usize,
+    /// Parts of the network that stay as they are besides, by the names of its parameters.
     pub frozen: Vec<String>,
     /// Decides what is held out, drawn and changed.
     pub seed: u64,
@@ -80,6 +85,8 @@ impl Default for Finetuning {
             trial: Preset::All,
             held_out: 0.15,
             variants: 4,
+            parts: Parts::All,
+            rank: 4,
             frozen: Vec::new(),
             seed: 1,
         }
@@ -141,6 +148,13 @@ impl Finetuning {
             ("batch", format!("{} triplets", self.batch)),
             ("rate", self.rate.to_string()),
             ("margin", self.margin.to_string()),
+            (
+                "parts",
+                match self.parts {
+                    Parts::LowRank => format!("{}, rank {}", self.parts.key(), self.rank),
+                    parts => parts.key().to_owned(),
+                },
+            ),
             ("frozen", self.frozen.join(" ")),
             ("seed", self.seed.to_string()),
             ("licence", "MIT OR Apache-2.0".to_owned()),
@@ -163,9 +177,12 @@ impl Finetuning {
         if self.steps == 0 || !self.steps.is_multiple_of(self.round) {
             return refuse("steps", self.steps.to_string(), "must be a multiple of `round`");
         }
-        for (name, count) in
-            [("batch", self.batch), ("patience", self.patience), ("variants", self.variants)]
-        {
+        for (name, count) in [
+            ("batch", self.batch),
+            ("patience", self.patience),
+            ("variants", self.variants),
+            ("rank", self.rank),
+        ] {
             if count == 0 {
                 return refuse(name, "0".to_owned(), "must be at least 1");
             }
@@ -178,6 +195,12 @@ impl Finetuning {
         Ok(())
     }
 
+    /// The network as it learns.
+    fn student<N: Tunable>(&self, network: N) -> Result<Student<N>> {
+        let (network, frozen) = self.parts.prepare(network, &self.frozen, self.rank, self.seed)?;
+        Student::new(network, self.margin, &frozen)
+    }
+
     fn mine<N: Tunable>(
         &self,
         student: &Student<N>,
@@ -187,7 +210,11 @@ impl Finetuning {
         let Some(poses) = material.poses() else {
             return Mined::without_poses(material.len(), &split.training);
         };
-        self.mining.with_poses(&material.describe(student.network())?, poses, &split.training)
+        self.mining.with_poses(
+            &material.describe(&merged(student.network()))?,
+            poses,
+            &split.training,
+        )
     }
 }
 
@@ -230,7 +257,7 @@ pub fn finetune<N: Tunable>(
     keep_if_best(folder, 0, before, &network)?;
     weights::save(&network, &folder.join(START), &[], Precision::Single)?;
     let like = network.clone();
-    let mut student = Student::new(network, settings.margin, &settings.frozen)?;
+    let mut student = settings.student(network)?;
     let done = Checkpoint::new(folder).latest()?.unwrap_or(0) / settings.round;
     for round in done..=settings.steps / settings.round {
         let descent = |rounds: usize| Descent {
@@ -304,11 +331,11 @@ fn is_better(new: &Score, old: &Score) -> bool {
 /// [`CoreError::Format`] if there is none; those of files.
 pub fn last(settings: &Finetuning, folder: &Path) -> Result<DefaultEncoder> {
     let network = DefaultEncoderConfig::new().init(&device());
-    let student = Student::new(network, settings.margin, &settings.frozen)?;
+    let student = settings.student(network)?;
     let saved = Checkpoint::new(folder).load(student, Optimizer::Adam.init())?;
     let (_, student, _) =
         saved.ok_or_else(|| CoreError::format(folder, "checkpoint", "is not there"))?;
-    Ok(student.network().clone())
+    Ok(merged(student.network()))
 }
 
 /// Mines, and takes the steps of a round.
@@ -325,7 +352,7 @@ fn one_round<N: Tunable>(
     let cells = |report: &Report, student: &Student<N>| {
         let mut cells = vec![format!("{:.5}", report.loss), format!("{:.3e}", report.rate)];
         if report.step == end {
-            let score = judged(report, student.network()).map_err(core)?;
+            let score = judged(report, &merged(student.network())).map_err(core)?;
             cells.extend([format!("{:.4}", score.recall), format!("{:.5}", score.gap)]);
         } else {
             cells.extend([String::new(), String::new()]);

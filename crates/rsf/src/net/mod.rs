@@ -2,6 +2,7 @@
 
 mod finetune;
 mod lessons;
+mod low_rank;
 mod material;
 mod mixture;
 mod parts;
@@ -14,8 +15,9 @@ mod whitening;
 pub use finetune::{Finetuning, Outcome, finetune, last, run_log};
 pub use lessons::{Lessons, TripletBatch};
 pub use material::{Material, default_network};
+pub use parts::Parts;
 pub use student::Student;
 pub use trial::{Score, Trial};
-#[cfg(feature = "study")]
-pub(crate) use whitening::features;
 pub use whitening::{Whitening, projected, whiten};
+#[cfg(feature = "study")]
+pub(crate) use whitening::{features, pooled_features, projection};

@@ -123,6 +123,60 @@ fn frozen_parts_stay_and_others_move_also_after_a_kill() {
 }
 
 #[test]
+fn a_part_of_the_network_learns_alone_also_after_a_kill() {
+    let folder = tempfile::tempdir().unwrap();
+    let set = map(folder.path(), 6, true);
+    let (start, _) = default_network(None).unwrap();
+    let before = weights(&start);
+    for parts in [Parts::LastBlock, Parts::LowRank] {
+        let settings = Finetuning { parts, rank: 2, ..settings() };
+        let work = |name: &str| folder.path().join(format!("{name}-{}", parts.key()));
+        assert!(tuned(&settings, &set, &work("killed"), 10).is_err());
+        let [again, whole] =
+            ["killed", "whole"].map(|it| tuned(&settings, &set, &work(it), usize::MAX).unwrap());
+        assert_eq!(weights(&again.network), weights(&whole.network));
+        let after = last_weights(&settings, &work("whole"));
+        assert_eq!(after, last_weights(&settings, &work("killed")));
+        let block = |name: &String| name.starts_with("trunk.stages.2.blocks.0.");
+        let (block, rest): (Vec<_>, Vec<_>) = moved(&before, &after).into_iter().partition(block);
+        if parts == Parts::LastBlock {
+            assert_eq!(rest, ["head.bias", "head.weight", "trunk.reduce.weight"]);
+            assert_eq!(block.len(), 6, "{block:?}");
+        } else {
+            assert_eq!(rest, ["head.weight", "trunk.reduce.weight"]);
+            assert_eq!(block.len(), 2, "{block:?}");
+            for name in rest.iter().chain(&block) {
+                assert_eq!(rank(&before, &after, name), 2, "{name}");
+            }
+        }
+        let settings = Finetuning { rate: 0.0, steps: 5, ..settings };
+        tuned(&settings, &set, &work("still"), usize::MAX).unwrap();
+        assert_eq!(last_weights(&settings, &work("still")), before, "not a bit at a rate of zero");
+    }
+}
+
+/// How many directions a matrix moved in: singular values above rounding.
+fn rank(before: &[(String, Vec<f32>)], after: &[(String, Vec<f32>)], name: &str) -> usize {
+    let rows = match name {
+        "head.weight" => 256,
+        "trunk.reduce.weight" => 48,
+        _ => 128,
+    };
+    let of = |weights: &[(String, Vec<f32>)]| -> Vec<f64> {
+        let values = &weights.iter().find(|it| it.0 == name).unwrap().1;
+        values.iter().map(|it| f64::from(*it)).collect()
+    };
+    let (before, after) = (of(before), of(after));
+    let change: Vec<f64> = after.iter().zip(&before).map(|(a, b)| a - b).collect();
+    let change = nalgebra::DMatrix::from_row_slice(rows, change.len() / rows, &change);
+    // Of the small square of products, so that rounding weighs as its square.
+    let values = (&change * change.transpose()).symmetric_eigenvalues();
+    let largest = values.max();
+    assert!(largest > 0.0);
+    values.iter().filter(|it| **it > 1e-6 * largest).count()
+}
+
+#[test]
 fn what_cannot_be_learned_from_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let set = map(folder.path(), 4, true);
@@ -174,8 +228,8 @@ fn between_two_networks_lie_others() {
         Weights::open(file.path()).unwrap()
     };
     let (a, b) = (saved(&start), saved(&end));
-    assert_eq!(weights(&mixture::mixed(&a, &b, 0.0).unwrap()), weights(&start));
-    let half = weights(&mixture::mixed(&a, &b, 0.5).unwrap());
+    assert_eq!(weights(&mixture::mixed(start.clone(), &a, &b, 0.0).unwrap()), weights(&start));
+    let half = weights(&mixture::mixed(start.clone(), &a, &b, 0.5).unwrap());
     assert_eq!(moved(&weights(&start), &half), ["head.bias", "head.weight"]);
     let values = |weights: &[(String, Vec<f32>)]| -> Vec<f32> {
         weights.iter().find(|it| it.0 == "head.bias").unwrap().1.clone()

@@ -2,6 +2,7 @@
 
 mod adapted;
 mod attention;
+mod choice;
 mod embedding;
 mod gallery;
 mod gaps;
@@ -42,6 +43,15 @@ pub enum Study {
         places: Vec<Place>,
         /// Which network is adapted.
         encoder: Encoder,
+    },
+    /// Every pair of a prior and a ridge of projections, by recall@1, and the best of them.
+    Choice {
+        /// Columns, of which no table has one.
+        places: Vec<Place>,
+        /// Shares of the old projection.
+        priors: Vec<f64>,
+        /// Variances within a place beside what was seen.
+        ridges: Vec<f64>,
     },
     /// References and the training domain as the network sees them, in a plane: figure 4.1.
     Embedding {
@@ -175,6 +185,9 @@ pub fn run(experiment: &Experiment<Study>, sources: &Sources<'_>) -> Result<Repo
         }
         Study::Prediction { places, encoder } => {
             prediction::run(&mut table, places, encoder, sources)?;
+        }
+        Study::Choice { places, priors, ridges } => {
+            choice::run(&mut table, places, (priors, ridges), sources)?;
         }
         Study::Embedding { training, places } => {
             figure = embedding::run(&mut table, training, places, sources)?;

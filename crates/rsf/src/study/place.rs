@@ -32,6 +32,9 @@ pub struct Place {
     /// are left out no longer is.
     #[serde(default = "one")]
     pub every: usize,
+    /// What a metre of the distances of mining is here: below 1 for rooms.
+    #[serde(default = "unscaled")]
+    pub scale: f64,
     /// Instead of a dataset of the manifest: one walk round a block more than once.
     #[serde(default)]
     pub laps: Option<Laps>,
@@ -39,6 +42,10 @@ pub struct Place {
 
 fn one() -> usize {
     1
+}
+
+fn unscaled() -> f64 {
+    1.0
 }
 
 /// Frames of one walk: a lap is the map, what comes later the queries.

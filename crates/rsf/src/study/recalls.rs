@@ -246,7 +246,8 @@ pub(super) fn adapted_now(
     if let Some(whitening) = encoder.whitening(seed) {
         return Ok(Some(whitened_now(&whitening, &material, sources)?));
     }
-    let Some(settings) = encoder.finetuning(seed) else { return Ok(None) };
+    let Some(mut settings) = encoder.finetuning(seed) else { return Ok(None) };
+    settings.mining = settings.mining.scaled(encoder.learned_from(place).scale);
     let (network, digest) = default_network(start.as_deref())?;
     let facts = settings.facts(&material, &digest);
     let folder = kept("rsf", &facts, sources);
