@@ -9,16 +9,18 @@ use std::{fs, path::Path};
 
 use burn::tensor::{Device, Tensor, TensorData};
 use half::f16;
+use ndarray::array;
 use safetensors::{
     Dtype, serialize_to_file,
     tensor::{TensorView, serialize},
 };
+use vpr_core::Descriptors;
 use vpr_nets::{
     backbone::{
         AlexNetConfig, Calc, ResNetConfig,
         alexnet::{Layer, NormOrder},
     },
-    encode::{Options, Request, Size, by_request, encode_images, registry::Matching},
+    encode::{Options, Request, Size, by_request, encode_images, l1, registry::Matching},
     weights::{Precision, Weights, save},
 };
 use vpr_vision::image::{ImageSize, RgbImage, from_pixels};
@@ -223,6 +225,18 @@ fn a_mean_image_beside_the_weights_is_subtracted() {
     assert_eq!(encoder.matching(), Matching::Euclidean);
     fs::remove_file(path("amosnet_mean.binaryproto")).unwrap();
     assert_eq!(by_request(&request("hybridnet")).unwrap().matching(), Matching::L1);
+}
+
+#[test]
+fn the_match_is_the_published_one_and_not_that_of_euclid() {
+    let references = Descriptors::new(array![[3.0, 3.0], [0.0, 5.0]]).unwrap();
+    let queries = Descriptors::new(array![[0.0, 0.0]]).unwrap();
+    let found = l1::similarities(&queries, &references).unwrap();
+    assert_eq!(found.view(), array![[1.0 - 6.0 / 65_536.0, 1.0 - 5.0 / 65_536.0]]);
+    // Euclid: √18 < 5.
+    assert_eq!(found.best().reference, [1]);
+    let narrow = Descriptors::new(array![[0.0]]).unwrap();
+    assert!(l1::similarities(&narrow, &references).is_err());
 }
 
 /// NetVLAD on VGG-16 at the official shapes, whitened from 32 768 to 4096 values. Weights are stored in

@@ -182,6 +182,8 @@ pub enum Study {
         datasets: Vec<String>,
         /// Techniques whose stored matches stand beside.
         stored: Vec<Technique>,
+        /// Where a dataset has more pairs of images, `CoHOG`, which compares regions, is left out.
+        max_cohog_pairs: usize,
     },
     /// How often a radius and what two images share disagree: overlap.
     Overlap {
@@ -305,8 +307,10 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         Study::Winners { datasets } => {
             winners::run(&mut table, datasets, context).map(no_figure)?
         }
-        Study::Vocabularies { techniques, datasets, stored } => {
-            let compared = vocabularies::Compared { techniques, datasets, stored };
+        Study::Vocabularies { techniques, datasets, stored, max_cohog_pairs } => {
+            let max_cohog_pairs = *max_cohog_pairs;
+            let compared =
+                vocabularies::Compared { techniques, datasets, stored, max_cohog_pairs };
             vocabularies::run(&mut table, &compared, context).map(no_figure)?
         }
         Study::Overlap { worlds, radii } => {
