@@ -202,8 +202,7 @@ fn areas_are_told_apart_by_the_same_p_values() {
     let evaluations: Vec<_> =
         judged.iter().map(|it| Evaluation::of_confidence(&confidence, it).unwrap()).collect();
     let (definition, resampling) = (Definition::Corrected, Resampling::default());
-    let best =
-        |it: &[Evaluation<'_>]| best_by_auc_pr(it, definition, &resampling, 0.05).unwrap();
+    let best = |it: &[Evaluation<'_>]| best_by_auc_pr(it, definition, &resampling, 0.05).unwrap();
     assert_eq!(best(&evaluations[..2]), Some(0));
     let test = evaluations[0].auc_pr_test(&evaluations[2], definition, &resampling).unwrap();
     let is_best = best(&[evaluations[0].clone(), evaluations[2].clone()]).is_some();
@@ -217,12 +216,10 @@ fn many_methods_are_resampled_often_enough() {
     let n = 60;
     let confidence = vec![0.0; n];
     let share = |it: usize| if it == 0 { 10 } else { 1 };
-    let judged: Vec<_> = (0..15)
-        .map(|it| Judged::from_flags(right(share(it), n), vec![true; n]).unwrap())
-        .collect();
+    let judged: Vec<_> =
+        (0..15).map(|it| Judged::from_flags(right(share(it), n), vec![true; n]).unwrap()).collect();
     let evaluations: Vec<_> =
         judged.iter().map(|it| Evaluation::of_confidence(&confidence, it).unwrap()).collect();
-    let best =
-        best_by_auc_pr(&evaluations, Definition::Corrected, &Resampling::default(), 0.05);
+    let best = best_by_auc_pr(&evaluations, Definition::Corrected, &Resampling::default(), 0.05);
     assert_eq!(best.unwrap(), Some(0));
 }

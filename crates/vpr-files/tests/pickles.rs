@@ -182,7 +182,9 @@ fn size(value: &Value) -> usize {
         Value::Bytes(bytes) => bytes.len(),
         Value::Text(text) => text.len(),
         Value::List(values) | Value::Tuple(values) => values.iter().map(size).sum(),
-        Value::Dict(pairs) => pairs.iter().map(|(key, value)| size(key) + size(value)).sum(),
+        Value::Dict(pairs) | Value::Record { fields: pairs, .. } => {
+            pairs.iter().map(|(key, value)| size(key) + size(value)).sum()
+        }
         Value::Tensor(tensor) => tensor.storage.len() + 2 * tensor.shape.len(),
         Value::Array { shape, elements } => {
             shape.len()
@@ -300,7 +302,7 @@ fn hostile_estimators_are_refused_with_their_offset() {
     }
     let made = [CLASS.as_bytes(), b"(I1\nt\x81."].concat();
     let made = decode_estimators(&made).unwrap_err().to_string();
-    assert_eq!(made, "byte 43: NEWOBJ: a KMeans is made from arguments");
+    assert_eq!(made, "byte 37: NEWOBJ: a KMeans is made from arguments");
     // One that holds itself.
     let itself =
         format!("ccopy_reg\n_reconstructor\n({CLASS}c__builtin__\nobject\nNtRp0\n(S'a'\ng0\ndb.");

@@ -309,8 +309,7 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         }
         Study::Vocabularies { techniques, datasets, stored, max_cohog_pairs } => {
             let max_cohog_pairs = *max_cohog_pairs;
-            let compared =
-                vocabularies::Compared { techniques, datasets, stored, max_cohog_pairs };
+            let compared = vocabularies::Compared { techniques, datasets, stored, max_cohog_pairs };
             vocabularies::run(&mut table, &compared, context).map(no_figure)?
         }
         Study::Overlap { worlds, radii } => {

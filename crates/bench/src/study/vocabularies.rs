@@ -53,9 +53,12 @@ pub(super) fn run(table: &mut Table, compared: &Compared<'_>, context: Context<'
             Ok(subject.noted(note))
         };
         let n_pairs = dataset.queries.len() * dataset.references.len();
-        let is_left_out =
-            |it: &&Runner| it.name == "cohog" && n_pairs > compared.max_cohog_pairs;
-        let computed = runners.iter().filter(|it| !is_left_out(it)).map(subject).collect::<Result<Vec<_>>>()?;
+        let is_left_out = |it: &&Runner| it.name == "cohog" && n_pairs > compared.max_cohog_pairs;
+        let computed = runners
+            .iter()
+            .filter(|it| !is_left_out(it))
+            .map(subject)
+            .collect::<Result<Vec<_>>>()?;
         let stored: Vec<Subject> = sources
             .stored_subjects(id)?
             .into_iter()

@@ -41,22 +41,3 @@ pub fn of_pair(a: &[f32], b: &[f32]) -> f64 {
     let differences = a.iter().zip(b).map(|(a, b)| (f64::from(*a) - f64::from(*b)).abs());
     1.0 - differences.sum::<f64>() / SCALE
 }
-
-#[cfg(test)]
-mod tests {
-    use ndarray::array;
-
-    use super::*;
-
-    #[test]
-    fn the_match_is_the_published_one_and_not_that_of_euclid() {
-        let references = Descriptors::new(array![[3.0, 3.0], [0.0, 5.0]]).unwrap();
-        let queries = Descriptors::new(array![[0.0, 0.0]]).unwrap();
-        let found = similarities(&queries, &references).unwrap();
-        assert_eq!(found.view(), array![[1.0 - 6.0 / 65_536.0, 1.0 - 5.0 / 65_536.0]]);
-        // Euclid: √18 < 5.
-        assert_eq!(found.best().reference, [1]);
-        let narrow = Descriptors::new(array![[0.0]]).unwrap();
-        assert!(similarities(&narrow, &references).is_err());
-    }
-}
