@@ -100,19 +100,19 @@ fn mean_of(path: &Path, mean: &Stored, device: &Device) -> Result<Tensor<4>> {
 /// A plane at `side` × `side`, centres of pixels on centres; beyond the border, the border.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "places in a plane")]
 fn bilinear(plane: &[f32], [rows, columns]: [usize; 2], side: usize) -> Vec<f32> {
-    let place = |at: usize, len: usize| {
+    let between = |at: usize, len: usize| {
         let exact = (at as f64 + 0.5) * len as f64 / side as f64 - 0.5;
         let exact = exact.clamp(0.0, (len - 1) as f64);
         let lower = exact as usize;
         (lower, (lower + 1).min(len - 1), exact - lower as f64)
     };
-    let across: Vec<_> = (0..side).map(|x| place(x, columns)).collect();
+    let across: Vec<_> = (0..side).map(|x| between(x, columns)).collect();
     let at = |y: usize, x: usize| f64::from(plane[y * columns + x]);
     let mut resized = Vec::with_capacity(side * side);
-    for (top, bottom, down) in (0..side).map(|y| place(y, rows)) {
+    for (top, bottom, down) in (0..side).map(|y| between(y, rows)) {
         for &(left, right, along) in &across {
-            let between = |y: usize| at(y, left) * (1.0 - along) + at(y, right) * along;
-            resized.push((between(top) * (1.0 - down) + between(bottom) * down) as f32);
+            let on = |y: usize| at(y, left) * (1.0 - along) + at(y, right) * along;
+            resized.push((on(top) * (1.0 - down) + on(bottom) * down) as f32);
         }
     }
     resized
