@@ -1,6 +1,7 @@
 //! Judged matches and how well a confidence or an uncertainty orders them: precision and recall,
 //! risk and coverage, intervals, comparisons.
 
+mod best;
 mod difference;
 
 use crate::{
@@ -12,6 +13,8 @@ use crate::{
     },
 };
 use serde::Serialize;
+
+pub use best::{best_by_auc_pr, best_by_hits};
 
 /// The best matches of a set of queries, judged.
 #[derive(Clone, Debug, PartialEq)]

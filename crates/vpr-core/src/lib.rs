@@ -39,7 +39,7 @@ mod scores;
 pub use definition::Definition;
 pub use descriptors::Descriptors;
 pub use error::{Error, Result};
-pub use evaluation::{Evaluation, Judged, Summary};
+pub use evaluation::{Evaluation, Judged, Summary, best_by_auc_pr, best_by_hits};
 pub use ground_truth::GroundTruth;
 pub use map::Map;
 pub use observer::Observer;

@@ -8,7 +8,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use vpr_core::{
-    Definition, Evaluation, Judged,
+    Definition, Evaluation, Judged, best_by_auc_pr, best_by_hits,
     metrics::{Difference, Discordant, McNemar, Plan, bootstrap::Resampling, holm},
 };
 
@@ -165,4 +165,61 @@ fn of_ten_equal_pairs_one_is_called_different_in_five_per_cent_of_studies_after_
     let (raw, corrected) = (share(false), share(true));
     println!("without {raw}, with Holm {corrected}");
     assert!(raw > 0.3 && corrected <= LEVEL + ALLOWED, "{raw} {corrected}");
+}
+
+fn right(share: usize, n: usize) -> Vec<bool> {
+    (0..n).map(|query| query * 7 % 10 < share).collect()
+}
+
+#[test]
+fn only_what_a_test_tells_from_every_other_is_best() {
+    let best = |hits: &[Vec<bool>]| best_by_hits(hits, McNemar::MidP, 0.05).unwrap();
+    assert_eq!(best(&[right(3, 200), right(9, 200), right(5, 200)]), Some(1));
+    // The same two are told apart alone and not beside a third that is as good.
+    assert_eq!(best(&[right(9, 200), right(5, 200), right(9, 200)]), None);
+    assert_eq!(best(&[right(9, 10), right(7, 10)]), None);
+    assert_eq!((best(&[right(9, 10)]), best(&[])), (None, None));
+    assert!(best_by_hits(&[right(9, 10), right(9, 11)], McNemar::MidP, 0.05).is_err());
+}
+
+/// Six wins of six have p = 1/64: enough alone, not among three pairs.
+#[test]
+fn more_comparisons_ask_for_more() {
+    let a: Vec<bool> = (0..20).map(|it| it < 16).collect();
+    let b: Vec<bool> = (0..20).map(|it| it < 10).collect();
+    let p = Discordant::count(&a, &b).unwrap().p_value(McNemar::MidP);
+    assert!((p - 1.0 / 64.0).abs() < 1e-12, "{p}");
+    let best = |hits: &[Vec<bool>], level| best_by_hits(hits, McNemar::MidP, level).unwrap();
+    assert_eq!(best(&[a.clone(), b.clone()], 0.02), Some(0));
+    assert_eq!(best(&[a, b.clone(), b], 0.02), None);
+}
+
+#[test]
+fn areas_are_told_apart_by_the_same_p_values() {
+    let n = 120;
+    let confidence: Vec<f64> = (0..n).map(|query| (query * 31 % 17) as f64).collect();
+    let judged = [9, 4, 8].map(|it| Judged::from_flags(right(it, n), vec![true; n]).unwrap());
+    let evaluations: Vec<_> =
+        judged.iter().map(|it| Evaluation::of_confidence(&confidence, it).unwrap()).collect();
+    let (definition, resampling) = (Definition::Corrected, Resampling::default());
+    let best = |it: &[Evaluation<'_>]| best_by_auc_pr(it, definition, &resampling, 0.05).unwrap();
+    assert_eq!(best(&evaluations[..2]), Some(0));
+    let test = evaluations[0].auc_pr_test(&evaluations[2], definition, &resampling).unwrap();
+    let is_best = best(&[evaluations[0].clone(), evaluations[2].clone()]).is_some();
+    assert_eq!(is_best, test.p_value <= 0.05, "{}", test.p_value);
+    assert_eq!(best(&[evaluations[0].clone(), evaluations[0].clone()]), None);
+}
+
+/// With the default number of resamples no corrected p-value of fifteen methods is below .1.
+#[test]
+fn many_methods_are_resampled_often_enough() {
+    let n = 60;
+    let confidence = vec![0.0; n];
+    let share = |it: usize| if it == 0 { 10 } else { 1 };
+    let judged: Vec<_> =
+        (0..15).map(|it| Judged::from_flags(right(share(it), n), vec![true; n]).unwrap()).collect();
+    let evaluations: Vec<_> =
+        judged.iter().map(|it| Evaluation::of_confidence(&confidence, it).unwrap()).collect();
+    let best = best_by_auc_pr(&evaluations, Definition::Corrected, &Resampling::default(), 0.05);
+    assert_eq!(best.unwrap(), Some(0));
 }

@@ -3,6 +3,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs,
+    num::NonZeroUsize,
     path::{Component, Path, PathBuf},
 };
 
@@ -44,6 +45,8 @@ pub struct DatasetEntry {
     pub spacing_m: Option<f64>,
     /// First frame used and the one after the last, of an archive of which not all is used.
     pub frames: Option<(usize, usize)>,
+    /// Of the frames used, only every one of this many, from the first.
+    pub every: Option<NonZeroUsize>,
     /// Citation or address.
     pub origin: String,
     /// Licence of the data.

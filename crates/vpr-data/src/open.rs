@@ -195,7 +195,7 @@ impl Datasets {
 
 /// Writes the frames of an archive as PNG files, those that are not there yet byte by byte.
 fn unpack(entry: &DatasetEntry, folder: &Path, cache: &Path) -> Result<Dataset> {
-    let pairs = FramePairs::read(folder, entry.frames)?;
+    let pairs = FramePairs::read(folder, entry.frames, entry.every)?;
     let mut digest = Sha256::new();
     for side in [&pairs.references, &pairs.queries] {
         digest.update(side.as_standard_layout().as_slice().unwrap_or_default());

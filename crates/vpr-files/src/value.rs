@@ -28,6 +28,15 @@ pub enum Value {
         /// The elements in C order, as many as the product of `shape`.
         elements: Elements,
     },
+    /// An estimator of scikit-learn with its fields, as
+    /// [`decode_estimators`](crate::pickle::decode_estimators) and
+    /// [`decode_checkpoint`](crate::pickle::decode_checkpoint) read it.
+    Record {
+        /// The name of its class.
+        class: String,
+        /// What it holds, in the order of the file.
+        fields: Vec<(Value, Value)>,
+    },
     /// A tensor of a PyTorch checkpoint; only [`decode_checkpoint`](crate::pickle::decode_checkpoint)
     /// makes these.
     Tensor(Tensor),
@@ -65,6 +74,7 @@ impl Value {
             Self::Tuple(_) => "a tuple",
             Self::Dict(_) => "a dict",
             Self::Array { .. } => "an array",
+            Self::Record { .. } => "an estimator",
             Self::Tensor(_) => "a tensor",
         }
     }

@@ -5,7 +5,9 @@
 use std::{fmt::Write as _, path::Path};
 
 use proptest::prelude::*;
-use vpr_files::pickle::{Elements, MAX_DEPTH, MAX_EXPANSION, Value, decode, read};
+use vpr_files::pickle::{
+    Elements, MAX_DEPTH, MAX_EXPANSION, Value, decode, decode_checkpoint, decode_estimators, read,
+};
 
 /// What `golden/pickles.py` writes.
 fn golden() -> Value {
@@ -180,7 +182,9 @@ fn size(value: &Value) -> usize {
         Value::Bytes(bytes) => bytes.len(),
         Value::Text(text) => text.len(),
         Value::List(values) | Value::Tuple(values) => values.iter().map(size).sum(),
-        Value::Dict(pairs) => pairs.iter().map(|(key, value)| size(key) + size(value)).sum(),
+        Value::Dict(pairs) | Value::Record { fields: pairs, .. } => {
+            pairs.iter().map(|(key, value)| size(key) + size(value)).sum()
+        }
         Value::Tensor(tensor) => tensor.storage.len() + 2 * tensor.shape.len(),
         Value::Array { shape, elements } => {
             shape.len()
@@ -233,5 +237,93 @@ proptest! {
         b"cnumpy.core.multiarray\nscalar\n", b"cnumpy.core.numeric\n_frombuffer\n",
     ]), 0..80)) {
         assert_bounded(&[parts.concat(), b".".to_vec()].concat());
+    }
+}
+
+/// What `data/golden/scikit/make.py` writes.
+fn vocabulary(protocol: u8) -> Vec<u8> {
+    let name = format!("../../data/golden/scikit/vocabulary-{protocol}.pkl");
+    std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(name)).unwrap()
+}
+
+#[test]
+fn estimators_are_records_of_their_fields_where_they_are_expected() {
+    for protocol in [0, 2, 4] {
+        let bytes = vocabulary(protocol);
+        let mut value = decode_estimators(&bytes).unwrap();
+        for key in [Value::Int(400), Value::Int(256), Value::Text("conv3".to_owned())] {
+            let Value::Dict(mut entries) = value else { panic!("{value:?}") };
+            assert_eq!((entries.len(), &entries[0].0), (1, &key), "protocol {protocol}");
+            value = entries.remove(0).1;
+        }
+        let Value::Record { class, fields } = value else { panic!("{value:?}") };
+        let field = |name: &str| &fields.iter().find(|it| it.0.as_text() == Some(name)).unwrap().1;
+        assert_eq!((class.as_str(), field("n_clusters")), ("KMeans", &Value::Int(4)));
+        let Value::Array { shape, elements } = field("cluster_centers_") else {
+            panic!("an array")
+        };
+        assert_eq!((&shape[..], elements.len()), (&[4, 6][..], 24));
+        assert!(decode(&bytes).unwrap_err().to_string().contains("not on the list"));
+    }
+}
+
+#[test]
+fn hostile_estimators_are_refused_with_their_offset() {
+    const CLASS: &str = "csklearn.cluster._kmeans\nKMeans\n";
+    let refused = |pickle: &str| decode_estimators(pickle.as_bytes()).unwrap_err().to_string();
+    for (pickle, message) in [
+        (
+            "csklearn.pipeline\nPipeline\n.".to_owned(),
+            "byte 0: GLOBAL: `sklearn.pipeline.Pipeline`",
+        ),
+        ("cos\nsystem\n(S'true'\ntR.".to_owned(), "byte 0: GLOBAL: `os.system`"),
+        (format!("{CLASS}(S'x'\ntR."), "byte 39: REDUCE: KMeans is not called"),
+        (format!("{CLASS}."), "is a function, not data"),
+        (format!("ccopy_reg\n_reconstructor\n({CLASS}c__builtin__\nobject\nNtR."), "has no fields"),
+        (
+            format!("ccopy_reg\n_reconstructor\n({CLASS}c__builtin__\nobject\nI1\ntR."),
+            "not an estimator",
+        ),
+        (
+            format!("ccopy_reg\n_reconstructor\n({CLASS}c__builtin__\nobject\nNtR(lb."),
+            "the fields of an estimator are not a dict",
+        ),
+        (
+            format!("ccopy_reg\n_reconstructor\n({CLASS}c__builtin__\nobject\nNtR(db(db."),
+            "the estimator has its fields already",
+        ),
+        (
+            "ccopy_reg\n_reconstructor\n(cnumpy\nndarray\nc__builtin__\nobject\nNtR.".to_owned(),
+            "not an estimator",
+        ),
+    ] {
+        let actual = refused(&pickle);
+        assert!(actual.starts_with("byte ") && actual.contains(message), "{pickle}: {actual}");
+    }
+    let made = [CLASS.as_bytes(), b"(I1\nt\x81."].concat();
+    let made = decode_estimators(&made).unwrap_err().to_string();
+    assert_eq!(made, "byte 37: NEWOBJ: a KMeans is made from arguments");
+    // One that holds itself.
+    let itself =
+        format!("ccopy_reg\n_reconstructor\n({CLASS}c__builtin__\nobject\nNtRp0\n(S'a'\ng0\ndb.");
+    assert!(refused(&itself).contains("nested more than"), "{}", refused(&itself));
+    assert!(decode_checkpoint(itself.as_bytes()).is_err());
+}
+
+proptest! {
+    /// Whatever is cut or flipped is refused or read, and nothing panics.
+    #[test]
+    fn damaged_estimators_never_panic(at in any::<prop::sample::Index>(), bit in 0_u8..8, cut: bool) {
+        for protocol in [0, 2, 4] {
+            let mut bytes = vocabulary(protocol);
+            let at = at.index(bytes.len());
+            if cut {
+                bytes.truncate(at);
+                prop_assert!(decode_estimators(&bytes).is_err());
+            } else {
+                bytes[at] ^= 1 << bit;
+                let _ = decode_estimators(&bytes);
+            }
+        }
     }
 }

@@ -1,5 +1,5 @@
-//! The networks of chapter 3 that Caffe trained: layers against OpenCV's, and every technique on five
-//! images with random weights of the official shapes.
+//! The networks of chapter 3: layers of those that Caffe trained against OpenCV's, and every technique on
+//! five images with random weights of the official shapes.
 
 #![expect(clippy::unwrap_used, clippy::print_stdout, reason = "a test may")]
 
@@ -8,16 +8,19 @@ mod golden;
 use std::{fs, path::Path};
 
 use burn::tensor::{Device, Tensor, TensorData};
+use half::f16;
+use ndarray::array;
 use safetensors::{
-    Dtype,
+    Dtype, serialize_to_file,
     tensor::{TensorView, serialize},
 };
+use vpr_core::Descriptors;
 use vpr_nets::{
     backbone::{
         AlexNetConfig, Calc, ResNetConfig,
         alexnet::{Layer, NormOrder},
     },
-    encode::{Options, Request, Size, by_request, encode_images},
+    encode::{Options, Request, Size, by_request, encode_images, l1, registry::Matching},
     weights::{Precision, Weights, save},
 };
 use vpr_vision::image::{ImageSize, RgbImage, from_pixels};
@@ -187,6 +190,100 @@ fn every_technique_describes_five_images() {
     fs::write(&regions, region_vlad()).unwrap();
     let published = described("regionvlad", &regions, 98_304);
     assert_ne!(published, described("regionvlad-corrected", &regions, 98_304));
+}
+
+/// With a mean image beside the weights, that is what is subtracted; descriptors are compared by L1.
+#[test]
+fn a_mean_image_beside_the_weights_is_subtracted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let model = path("amosnet.caffemodel");
+    fs::write(&model, caffemodel(&ALEXNET)).unwrap();
+    let without = described("amosnet", &model, 7680);
+    // `BlobProto`: field 7 the shape, field 5 the values. The mean of ImageNet, as an image.
+    let blob = |mean: [f32; 3]| {
+        let values = mean.iter().flat_map(|it| [it.to_le_bytes(); 4].concat()).collect::<Vec<u8>>();
+        [field(7, &field(1, &[1, 3, 2, 2])), field(5, &values)].concat()
+    };
+    fs::write(path("amosnet_mean.binaryproto"), blob([104.0, 117.0, 123.0])).unwrap();
+    let image_net = described("amosnet", &model, 7680);
+    for (a, b) in image_net.iter().flatten().zip(without.iter().flatten()) {
+        assert!((a - b).abs() < 1e-3 * b.abs().max(1.0), "{a} {b}");
+    }
+    fs::write(path("amosnet_mean.binaryproto"), blob([90.0, 140.0, 123.0])).unwrap();
+    assert_ne!(described("amosnet", &model, 7680), image_net);
+    fs::write(path("amosnet_mean.binaryproto"), blob([f32::NAN, 0.0, 0.0])).unwrap();
+    let request = |name: &str| Request {
+        name: name.to_owned(),
+        weights: Some(model.clone()),
+        ..Request::default()
+    };
+    let err = by_request(&request("amosnet")).map(|_| ()).unwrap_err().to_string();
+    assert!(err.contains("amosnet_mean.binaryproto"), "{err}");
+    // Another technique does not read it.
+    let encoder = by_request(&request("alexnet")).unwrap();
+    assert_eq!(encoder.matching(), Matching::Euclidean);
+    fs::remove_file(path("amosnet_mean.binaryproto")).unwrap();
+    assert_eq!(by_request(&request("hybridnet")).unwrap().matching(), Matching::L1);
+}
+
+#[test]
+fn the_match_is_the_published_one_and_not_that_of_euclid() {
+    let references = Descriptors::new(array![[3.0, 3.0], [0.0, 5.0]]).unwrap();
+    let queries = Descriptors::new(array![[0.0, 0.0]]).unwrap();
+    let found = l1::similarities(&queries, &references).unwrap();
+    assert_eq!(found.view(), array![[1.0 - 6.0 / 65_536.0, 1.0 - 5.0 / 65_536.0]]);
+    // Euclid: √18 < 5.
+    assert_eq!(found.best().reference, [1]);
+    let narrow = Descriptors::new(array![[0.0]]).unwrap();
+    assert!(l1::similarities(&narrow, &references).is_err());
+}
+
+/// NetVLAD on VGG-16 at the official shapes, whitened from 32 768 to 4096 values. Weights are stored in
+/// half precision, so that the file of this test has a third of a gigabyte.
+#[test]
+fn netvlad_describes_five_images() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("netvlad.safetensors");
+    let mut parts: Vec<(String, Vec<usize>, Vec<u8>)> = Vec::new();
+    let mut add = |key: &str, shape: &[usize], scale: f64| {
+        let values = numbers(400 + parts.len() as u64, shape.iter().product(), scale);
+        let bytes = values.iter().flat_map(|&it| f16::from_f32(it).to_le_bytes()).collect();
+        parts.push((key.to_owned(), shape.to_vec(), bytes));
+    };
+    let widths = [3, 64, 64, 128, 128, 256, 256, 256, 512, 512, 512, 512, 512, 512];
+    let places = [0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28];
+    for (place, width) in places.iter().zip(widths.windows(2)) {
+        let fan = 9.0 * f64::from(width[0]);
+        let [from, to] = [width[0], width[1]].map(|it| usize::try_from(it).unwrap());
+        add(&format!("backbone.{place}.weight"), &[to, from, 3, 3], (24.0 / fan).sqrt());
+        add(&format!("backbone.{place}.bias"), &[to], 0.2);
+    }
+    add("netvlad.score_proj.weight", &[64, 512, 1], 1.0);
+    add("netvlad.centers", &[512, 64], 0.2);
+    add("whiten.weight", &[4096, 32_768], 0.02);
+    add("whiten.bias", &[4096], 0.02);
+    let views = parts.iter().map(|(key, shape, bytes)| {
+        (key.as_str(), TensorView::new(Dtype::F16, shape.clone(), bytes).unwrap())
+    });
+    serialize_to_file(views, None, &path).unwrap();
+    drop(parts);
+    let request = Request {
+        name: "netvlad".to_owned(),
+        weights: Some(path),
+        size: Some(Size::Fixed { height: 64, width: 96 }),
+        ..Request::default()
+    };
+    let encoder = by_request(&request).unwrap();
+    assert_eq!(encoder.dimension(), 4096);
+    let rows = encode_images(&*encoder, &five_images(), &Options::default()).unwrap();
+    assert_eq!((rows.len(), rows.dim()), (5, 4096));
+    let rows: Vec<Vec<f32>> = rows.view().outer_iter().map(|row| row.to_vec()).collect();
+    for row in &rows {
+        let length: f32 = row.iter().map(|it| it * it).sum();
+        assert!((length - 1.0).abs() < 1e-4, "{length}");
+    }
+    assert!(rows[1..].iter().all(|row| *row != rows[0]), "two images have one descriptor");
 }
 
 /// The convolutions of AlexNet and a vocabulary of the scale of their sums.

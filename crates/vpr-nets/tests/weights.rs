@@ -256,3 +256,29 @@ fn empty_and_foreign_files_are_refused() {
     let missing = weights::load(&mut small(), "no/such.pth".as_ref(), &[]).unwrap_err();
     assert!(missing.to_string().contains("no/such.pth"), "{missing}");
 }
+
+/// What `data/golden/scikit/make.py` writes: arrays as scikit-learn has them, in f32.
+fn scikit(name: &str) -> weights::Weights {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/golden/scikit");
+    weights::Weights::open(&folder.join(name)).unwrap()
+}
+
+#[test]
+fn arrays_of_estimators_are_tensors_beside_the_weights() {
+    let arrays = scikit("arrays.safetensors");
+    for name in ["ap-gem.pt", "legacy.pt"] {
+        let checkpoint = scikit(name);
+        for part in ["mean", "components", "explained_variance"] {
+            let key = format!("pca.Landmarks_clean.{part}_");
+            assert_eq!(checkpoint.get(&key), arrays.get(part), "{name}: {key}");
+        }
+        // The prefix of the weights is left out as without estimators.
+        assert_eq!(checkpoint.get("conv1.weight").unwrap().data, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(checkpoint.get("adpool.p").unwrap().data, [3.0]);
+    }
+    for protocol in [0, 2, 4] {
+        let vocabulary = scikit(&format!("vocabulary-{protocol}.pkl"));
+        let words = vocabulary.get("400.256.conv3.cluster_centers_");
+        assert_eq!(words, arrays.get("cluster_centers"), "protocol {protocol}");
+    }
+}

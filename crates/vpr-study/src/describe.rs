@@ -29,6 +29,11 @@ pub trait Describe: Send + Sync {
     /// As [`Self::encode`]; [`Error::Empty`] without images.
     fn time(&self, images: &[PathBuf]) -> Result<Timing>;
 
+    /// Its vectors, kept on disk, as it compares them.
+    fn kept(&self, rows: Descriptors) -> Features {
+        Features::Vectors(rows)
+    }
+
     /// What to say of its descriptors where they are kept on disk; `None` if they are one vector
     /// per image but quickly made, or no vectors.
     fn about(&self) -> Option<About> {
@@ -41,6 +46,9 @@ pub trait Describe: Send + Sync {
 pub enum Features {
     /// One vector per image, compared by cosine.
     Vectors(Descriptors),
+    /// One vector per image, compared by the sum of absolute differences, as AMOSNet and HybridNet.
+    #[cfg(feature = "networks")]
+    Differences(Descriptors),
     /// A set of regions per image.
     Regions(Vec<CoHogDescriptor>),
 }
@@ -62,6 +70,8 @@ impl Features {
     pub fn len(&self) -> usize {
         match self {
             Self::Vectors(descriptors) => descriptors.len(),
+            #[cfg(feature = "networks")]
+            Self::Differences(descriptors) => descriptors.len(),
             Self::Regions(descriptors) => descriptors.len(),
         }
     }
@@ -77,6 +87,8 @@ impl Features {
     pub fn into_descriptors(self) -> Option<Descriptors> {
         match self {
             Self::Vectors(descriptors) => Some(descriptors),
+            #[cfg(feature = "networks")]
+            Self::Differences(descriptors) => Some(descriptors),
             Self::Regions(_) => None,
         }
     }
@@ -91,6 +103,12 @@ impl Features {
         match (self, references) {
             (Self::Vectors(queries), Self::Vectors(references)) => Ok(Matched {
                 similarities: hog::similarities(queries, references)?,
+                descriptor_bytes: references.dim() * size_of::<f32>(),
+                n_fallbacks: 0,
+            }),
+            #[cfg(feature = "networks")]
+            (Self::Differences(queries), Self::Differences(references)) => Ok(Matched {
+                similarities: vpr_nets::encode::l1::similarities(queries, references)?,
                 descriptor_bytes: references.dim() * size_of::<f32>(),
                 n_fallbacks: 0,
             }),

@@ -7,8 +7,8 @@ use std::{
     time::Instant,
 };
 
-use vpr_core::{Result, map::About, metrics::Timing};
-use vpr_nets::encode::{Encoder, Options, encode_files, encode_images};
+use vpr_core::{Descriptors, Result, map::About, metrics::Timing};
+use vpr_nets::encode::{Encoder, Options, encode_files, encode_images, l1, registry::Matching};
 use vpr_vision::{hog::similarity, image};
 
 use crate::describe::{Describe, Features, median};
@@ -24,7 +24,7 @@ impl fmt::Debug for Network {
 }
 
 impl Network {
-    /// The network as a technique: its descriptors are compared by cosine.
+    /// The network as a technique: its descriptors are compared by cosine, or as the network asks.
     #[must_use]
     pub fn new(encoder: Arc<dyn Encoder>) -> Self {
         Self(encoder)
@@ -44,7 +44,7 @@ impl Describe for Network {
             n_done = upto;
         };
         let rows = encode_files(self.0.as_ref(), images, &Options::default(), &mut done)?;
-        Ok(Features::Vectors(rows))
+        Ok(self.kept(rows))
     }
 
     fn time(&self, images: &[PathBuf]) -> Result<Timing> {
@@ -60,10 +60,20 @@ impl Describe for Network {
         }
         for (a, b) in rows.iter().zip(rows.iter().skip(1)) {
             let start = Instant::now();
-            similarity(a, b)?;
+            match self.0.matching() {
+                Matching::Euclidean => similarity(a, b)?,
+                Matching::L1 => l1::of_pair(a, b),
+            };
             matching.push(start.elapsed().as_secs_f64());
         }
         Ok(Timing { encoding: median(&mut encoding)?, matching: median(&mut matching)? })
+    }
+
+    fn kept(&self, rows: Descriptors) -> Features {
+        match self.0.matching() {
+            Matching::Euclidean => Features::Vectors(rows),
+            Matching::L1 => Features::Differences(rows),
+        }
     }
 
     fn about(&self) -> Option<About> {

@@ -254,6 +254,6 @@ impl<'a> Sources<'a> {
             let none = vpr_core::Error::Empty("vectors of a technique whose vectors are kept");
             encode()?.into_descriptors().ok_or(none)
         })?;
-        Ok(Features::Vectors(rows))
+        Ok(runner.technique.kept(rows))
     }
 }

@@ -98,6 +98,7 @@ fn entry(id: &str) -> Result<DatasetEntry> {
         },
         spacing_m: None,
         frames: None,
+        every: None,
         origin: format!("generated here; counterpart: {}", recipe.counterpart),
         licence: "MIT OR Apache-2.0".to_owned(),
         note: None,

@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 
 use vpr_core::{Descriptors, Error, Ranking};
-use vpr_nets::encode::{Encoder, Options, encode_files, registry::Method};
+use vpr_nets::encode::{
+    Encoder, Options, encode_files, l1,
+    registry::{Matching, Method},
+};
 use vpr_report::cli;
 use vpr_study::technique::{hand_crafted_names, on_request_names};
 
@@ -22,7 +25,7 @@ pub(super) struct Asked<'a> {
     pub(super) threads: Option<usize>,
 }
 
-/// Describes images by a network and retrieves by Euclidean distance.
+/// Describes images by a network and retrieves by Euclidean distance, or as the network compares.
 pub(super) fn retrieve(
     asked: &Asked<'_>,
     queries: Named,
@@ -32,6 +35,11 @@ pub(super) fn retrieve(
     let encoder = asked.encoder.open(asked.method, asked.data)?;
     let options = asked.encoder.options(asked.threads, false);
     let [query_rows, reference_rows] = encode(&*encoder, [&queries, &references], &options)?;
+    if encoder.matching() == Matching::L1 {
+        let similarities = l1::similarities(&query_rows, &reference_rows)?;
+        let retrieved = Retrieved::of_scores([queries, references], similarities, k)?;
+        return Ok(Retrieved { descriptors: Some((query_rows, reference_rows)), ..retrieved });
+    }
     let alone = if encoder.batch_dependent() && options.batch_size > 1 {
         cli::note(&format!(
             "descriptors of `{}` depend on their batch: images are described one by one as well",

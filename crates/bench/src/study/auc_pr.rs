@@ -1,16 +1,18 @@
 //! AUC-PR of techniques on datasets: table 3.5.
 
-use vpr_core::{Definition, Error, Result, metrics::effective};
+use vpr_core::{Definition, Error, Provenance, Result, metrics::effective};
 use vpr_report::{figure::Figure, table::Table};
+use vpr_study::{Runner, Subject};
 
-use super::Context;
+use super::{Context, best, in_every_clone};
 
 pub(super) fn run(
     table: &mut Table,
     datasets: &[String],
     context: Context<'_>,
 ) -> Result<Option<Figure>> {
-    for subject in context.sources.subjects(table, datasets)? {
+    let subjects = context.sources.subjects(table, datasets)?;
+    for subject in &subjects {
         let evaluation = subject.evaluation()?;
         for definition in [Definition::Published, Definition::Corrected] {
             let value = evaluation.auc_pr(definition);
@@ -21,6 +23,18 @@ pub(super) fn run(
                 Err(err) => return Err(err),
             };
             table.push(cell);
+        }
+    }
+    let runners = context.sources.runners()?;
+    for group in subjects.chunk_by(|a, b| a.row == b.row && a.provenance == b.provenance) {
+        // A generated row is the same with all weights and without: only who is in every clone contends.
+        let contends = |it: &&Subject| {
+            let is = |runner: &Runner| runner.column == it.column && in_every_clone(runner);
+            it.provenance != Provenance::Generated || runners.iter().any(is)
+        };
+        let group: Vec<Subject> = group.iter().filter(contends).cloned().collect();
+        if let Some(Subject { row, .. }) = group.first() {
+            best::mark_auc_pr(table, row, &group, context.seed)?;
         }
     }
     Ok(None)

@@ -1,6 +1,7 @@
 //! What an experiment file of chapter 3 can ask for, one file per study.
 
 mod auc_pr;
+mod best;
 mod chronology;
 mod cost;
 mod datasets;
@@ -20,6 +21,7 @@ mod spacing;
 mod swap;
 mod tolerances;
 mod verification;
+mod vocabularies;
 mod winners;
 mod worlds;
 
@@ -172,6 +174,17 @@ pub enum Study {
         /// Datasets, by id.
         datasets: Vec<String>,
     },
+    /// Techniques with a vocabulary that every clone has, beside others: dense-vlad.
+    Vocabularies {
+        /// Techniques, by name.
+        techniques: Vec<String>,
+        /// Datasets, by id.
+        datasets: Vec<String>,
+        /// Techniques whose stored matches stand beside.
+        stored: Vec<Technique>,
+        /// Where a dataset has more pairs of images, `CoHOG`, which compares regions, is left out.
+        max_cohog_pairs: usize,
+    },
     /// How often a radius and what two images share disagree: overlap.
     Overlap {
         /// Generated places whose recipe asks for `overlap`.
@@ -293,6 +306,11 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         }
         Study::Winners { datasets } => {
             winners::run(&mut table, datasets, context).map(no_figure)?
+        }
+        Study::Vocabularies { techniques, datasets, stored, max_cohog_pairs } => {
+            let max_cohog_pairs = *max_cohog_pairs;
+            let compared = vocabularies::Compared { techniques, datasets, stored, max_cohog_pairs };
+            vocabularies::run(&mut table, &compared, context).map(no_figure)?
         }
         Study::Overlap { worlds, radii } => {
             overlap::run(&mut table, worlds, radii, context).map(no_figure)?

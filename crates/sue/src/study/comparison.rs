@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use vpr_core::{Definition, Error, Evaluation, Provenance};
+use vpr_core::{Definition, Error, Evaluation, Provenance, best_by_auc_pr};
 use vpr_report::table::{Cell, Table, Value};
 
 use vpr_study::verification::LocalMethod;
@@ -14,6 +14,8 @@ use super::{
 };
 use crate::{Result, corpus::COUNTERPARTS};
 
+/// An estimator is called the best of a row at corrected p-values of at most this.
+const LEVEL: f64 = 0.05;
 /// Column of the share of correct best matches.
 const BASE_RATE: &str = "base rate";
 /// The estimator that others are compared with.
@@ -25,7 +27,6 @@ const WITHIN_CHANCE: &str =
     "not significantly different from SUE (paired bootstrap over queries, 95 %)";
 
 pub(super) fn run(table: &mut Table, subjects: &[Subject], context: Context<'_>) -> Result<()> {
-    table.highest_is_best = true;
     let all = open(table, subjects, REFERENCE, context)?;
     for (opened, verify) in &all {
         let scored = opened.score_all(verify, context)?;
@@ -39,6 +40,7 @@ pub(super) fn run(table: &mut Table, subjects: &[Subject], context: Context<'_>)
             let place = (opened.row.as_str(), it.name);
             opened.push_auc(table, place, it, remark.as_deref())?;
         }
+        mark_best(table, opened, &scored, context)?;
     }
     average(table);
     if context.timings {
@@ -70,6 +72,45 @@ fn is_within_chance(
         Err(Error::Undefined { .. }) => Ok(false),
         Err(err) => Err(err.into()),
     }
+}
+
+/// Marks what the paired bootstrap tells from every other estimator of the row.
+fn mark_best(
+    table: &mut Table,
+    opened: &Labelled,
+    scored: &[Scored],
+    context: Context<'_>,
+) -> Result<()> {
+    // A generated row is the same with all weights and without: what needs some does not contend.
+    let needs_weights = |name: &str| {
+        LocalMethod::ALL.iter().any(|it| it.name() == name && it.features().is_learned())
+    };
+    let contends = |it: &&Scored| opened.is_real() || !needs_weights(it.name);
+    for definition in [Definition::Published, Definition::Corrected] {
+        let (mut names, mut evaluations) = (Vec::new(), Vec::new());
+        for it in scored.iter().filter(contends) {
+            let Ok(uncertainty) = &it.uncertainty else { continue };
+            let evaluation = Evaluation::new(uncertainty, it.judged(opened))?;
+            match evaluation.auc_pr(definition) {
+                Ok(_) => {
+                    names.push(it.name);
+                    evaluations.push(evaluation);
+                }
+                Err(Error::Undefined { .. }) => {}
+                Err(err) => return Err(err.into()),
+            }
+        }
+        let best = best_by_auc_pr(&evaluations, definition, &context.resampling(), LEVEL)?;
+        let Some(best) = best.map(|it| names[it]) else { continue };
+        let definition = definition.to_string();
+        let is_it = |cell: &&mut Cell| {
+            cell.row == opened.row
+                && cell.column == best
+                && cell.definition.as_ref() == Some(&definition)
+        };
+        table.cells.iter_mut().filter(is_it).for_each(|cell| cell.best = true);
+    }
+    Ok(())
 }
 
 /// The mean over the six counterparts of every method that has a value on all of them.

@@ -203,7 +203,7 @@ fn check(n_queries: usize, resampling: &Resampling) -> Result<()> {
 
 /// Draws `n_queries` queries with replacement, always the same for the same seed and resample.
 #[expect(clippy::cast_possible_truncation, reason = "a query index fits usize")]
-fn draw(n_queries: usize, seed: u64, resample: usize) -> Vec<usize> {
+pub(crate) fn draw(n_queries: usize, seed: u64, resample: usize) -> Vec<usize> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(resample as u64);
     // Drawn as u64, so that it does not depend on the width of usize.

@@ -38,16 +38,23 @@ pub fn paired_test(
         resample(n_queries, resampling, |queries| Ok(first(queries)? - second(queries)?))?;
     let values = &resampled.values;
     let n = values.len() as f64;
-    let not_above = values.partition_point(|it| *it <= 0.0) as f64;
-    let not_below = n - values.partition_point(|it| *it < 0.0) as f64;
     let mean = values.iter().sum::<f64>() / n;
     let squares: f64 = values.iter().map(|it| (it - mean).powi(2)).sum();
     Ok(Difference {
         interval: resampled.interval(resampling.level),
-        p_value: (2.0 * (not_above.min(not_below) + 1.0) / (n + 1.0)).min(1.0),
+        p_value: share_beyond_zero(values),
         standard_error: (squares / (n - 1.0).max(1.0)).sqrt(),
         n_queries,
     })
+}
+
+/// Twice the share of differences on the rarer side of 0, one more counted there: the p-value of a
+/// [`Difference`].
+pub(crate) fn share_beyond_zero(differences: &[f64]) -> f64 {
+    let not_above = differences.iter().filter(|it| **it <= 0.0).count();
+    let not_below = differences.iter().filter(|it| **it >= 0.0).count();
+    let rarer = not_above.min(not_below) as f64;
+    (2.0 * (rarer + 1.0) / (differences.len() as f64 + 1.0)).min(1.0)
 }
 
 impl Difference {

@@ -51,6 +51,7 @@ pub use average::mean_average_precision;
 pub use binomial::LogFactorials;
 pub use correlation::spearman;
 pub use curve::{Positives, PrecisionRecall, auc_pr, average_precision, precision_recall_curve};
+pub(crate) use difference::share_beyond_zero;
 pub use difference::{Difference, paired_test};
 pub use economy::{EncodingReference, Platform, RealTimeMatches, pcu, rmf};
 pub use invariance::area_between_curves;

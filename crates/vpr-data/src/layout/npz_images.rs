@@ -1,7 +1,7 @@
 //! Two traverses as `uint8` arrays `n × height × width` in one archive, aligned by index: `summer`,
 //! the map, and `winter`, the queries (Nordland 64×32).
 
-use std::{fs, path::Path};
+use std::{fs, num::NonZeroUsize, path::Path};
 
 use ndarray::{Array3, ArrayView2, Axis};
 
@@ -30,13 +30,17 @@ impl FramePairs {
     /// The frames that are not near-black in either traverse, from the one archive in `folder`.
     ///
     /// `stretch` keeps the first of these up to, not including, the second, counted after the
-    /// near-black ones are left out.
+    /// near-black ones are left out; `every` keeps one of this many of the rest.
     ///
     /// # Errors
     ///
     /// [`Error::Io`] or [`Error::Format`] if there is not one archive, an array is missing or of
     /// another type, the two differ in shape, or the stretch ends past the frames.
-    pub fn read(folder: &Path, stretch: Option<(usize, usize)>) -> Result<Self> {
+    pub fn read(
+        folder: &Path,
+        stretch: Option<(usize, usize)>,
+        every: Option<NonZeroUsize>,
+    ) -> Result<Self> {
         let path = archive(folder)?;
         let references: Array3<u8> = npz::read(&path, REFERENCES)?;
         let queries: Array3<u8> = npz::read(&path, QUERIES)?;
@@ -57,6 +61,7 @@ impl FramePairs {
             }
             frames = frames[first..end].to_vec();
         }
+        frames = frames.into_iter().step_by(every.map_or(1, NonZeroUsize::get)).collect();
         let references = references.select(Axis(0), &frames);
         let queries = queries.select(Axis(0), &frames);
         Ok(Self { frames, references, queries })
@@ -113,13 +118,15 @@ mod tests {
     fn frames_that_are_dark_in_either_traverse_are_left_out_of_both() {
         let folder = tempfile::tempdir().unwrap();
         write(folder.path(), &[("summer", traverse(&[1])), ("winter", traverse(&[3]))]);
-        let pairs = FramePairs::read(folder.path(), None).unwrap();
+        let pairs = FramePairs::read(folder.path(), None, None).unwrap();
         assert_eq!(pairs.frames, [0, 2, 4]);
         assert_eq!(pairs.references[[1, 0, 1]], 102);
         assert_eq!(pairs.references, pairs.queries);
-        let pairs = FramePairs::read(folder.path(), Some((1, 3))).unwrap();
+        let pairs = FramePairs::read(folder.path(), Some((1, 3)), None).unwrap();
         assert_eq!(pairs.frames, [2, 4]);
-        let err = FramePairs::read(folder.path(), Some((1, 4))).unwrap_err().to_string();
+        let pairs = FramePairs::read(folder.path(), None, NonZeroUsize::new(2)).unwrap();
+        assert_eq!(pairs.frames, [0, 4]);
+        let err = FramePairs::read(folder.path(), Some((1, 4)), None).unwrap_err().to_string();
         assert!(err.contains("not within 3 frames"), "{err}");
     }
 
@@ -127,13 +134,17 @@ mod tests {
     fn a_missing_array_and_another_shape_are_named() {
         let folder = tempfile::tempdir().unwrap();
         write(folder.path(), &[("summer", traverse(&[]))]);
-        assert!(FramePairs::read(folder.path(), None).unwrap_err().to_string().contains("winter"));
+        assert!(
+            FramePairs::read(folder.path(), None, None).unwrap_err().to_string().contains("winter")
+        );
         let shorter = traverse(&[]).slice_move(ndarray::s![..4, .., ..]);
         write(
             folder.path(),
             &[("summer", traverse(&[])), ("winter", shorter.as_standard_layout().to_owned())],
         );
-        assert!(FramePairs::read(folder.path(), None).unwrap_err().to_string().contains("winter"));
-        assert!(FramePairs::read(Path::new("/nowhere"), None).is_err());
+        assert!(
+            FramePairs::read(folder.path(), None, None).unwrap_err().to_string().contains("winter")
+        );
+        assert!(FramePairs::read(Path::new("/nowhere"), None, None).is_err());
     }
 }

@@ -160,6 +160,10 @@ pub(crate) const TARGETS: &[Target] = &[
     read_target!("vpr-bench-areas", "a.pickle", read_areas),
     file_of_weights!("caffemodel", "a.caffemodel", caffe::read_model),
     file_of_weights!("binaryproto", "a.binaryproto", caffe::read_blob),
+    file_of_weights!("estimators", "a.pkl", |path: &Path| {
+        let bytes = fs::read(path).map_err(vpr_files::Error::io(path))?;
+        pickle::decode_estimators(&bytes).map_err(|refusal| refusal.in_file(path, 0))
+    }),
     file_of_weights!("mat", "a.mat", |path: &Path| {
         let file = MatFile::open(path)?;
         let numbers = |name| file.array_named(name).map(|array| array.to_f64s());
@@ -313,6 +317,11 @@ fn write_weight_seeds(seed: &dyn Fn(&str, &str, &Path)) {
     ] {
         let stem = name.split('.').next().unwrap();
         seed(target, &format!("sound-{stem}"), &weights.join(name));
+    }
+    let estimators = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/golden/scikit");
+    for protocol in [0, 2, 4] {
+        let name = format!("vocabulary-{protocol}.pkl");
+        seed("estimators", &format!("sound-{protocol}"), &estimators.join(name));
     }
 }
 

@@ -17,8 +17,16 @@ use crate::{
 ///
 /// As for [`super::read()`] and [`super::read_objects`].
 pub fn read_value(path: &Path) -> Result<Value> {
-    let bytes = std::fs::read(path).map_err(Error::io(path))?;
-    value(&bytes).map_err(|(offset, reason)| at(path, offset, reason))
+    decode_value(path, &std::fs::read(path).map_err(Error::io(path))?)
+}
+
+/// The same of bytes; `path` is what errors call them.
+///
+/// # Errors
+///
+/// Those of [`read_value`], reading apart.
+pub fn decode_value(path: &Path, bytes: &[u8]) -> Result<Value> {
+    value(bytes).map_err(|(offset, reason)| at(path, offset, reason))
 }
 
 /// The array of a whole `.npy` file, or where and why there is none.

@@ -14,7 +14,7 @@ use std::path::Path;
 
 use ndarray::{Array, Array1, Array2, ArrayView2, Dimension};
 
-pub use any::read_value;
+pub use any::{decode_value, read_value};
 pub use read::Element;
 
 use crate::{

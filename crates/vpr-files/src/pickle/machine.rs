@@ -7,12 +7,21 @@ use super::{
     cursor::Cursor,
     numpy,
     object::{Arena, Global, Name, Node, Object},
-    text, torch,
+    scikit, text, torch,
 };
 
 /// Runs a pickle up to its STOP; returns its root and the objects made on the way.
 pub(super) fn run(bytes: &[u8]) -> Result<(Node<'_>, Arena<'_>), Refusal> {
-    let (root, machine) = Machine::new(bytes, Dialect::NumPy).run()?;
+    run_whole(bytes, Dialect::NumPy)
+}
+
+/// The same of a pickle with estimators of scikit-learn.
+pub(super) fn run_estimators(bytes: &[u8]) -> Result<(Node<'_>, Arena<'_>), Refusal> {
+    run_whole(bytes, Dialect::Estimators)
+}
+
+fn run_whole(bytes: &[u8], dialect: Dialect) -> Result<(Node<'_>, Arena<'_>), Refusal> {
+    let (root, machine) = Machine::new(bytes, dialect).run()?;
     match machine.cursor.left() {
         0 => Ok((root, machine.arena)),
         left => machine.refuse(format!("STOP: {left} bytes follow")),
@@ -30,7 +39,9 @@ pub(super) fn run_checkpoint(bytes: &[u8]) -> Result<(Node<'_>, Arena<'_>, usize
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Dialect {
     NumPy,
-    /// NumPy's and PyTorch's.
+    /// NumPy's and scikit-learn's.
+    Estimators,
+    /// NumPy's, scikit-learn's and PyTorch's.
     Torch,
 }
 
@@ -87,7 +98,8 @@ impl<'a> Machine<'a> {
             b'c' | 0x93 => self.global(code),
             b'R' => self.reduce(),
             b'b' => self.build(),
-            b'Q' | 0x81 if self.dialect == Dialect::Torch => self.torch(code),
+            b'Q' if self.dialect == Dialect::Torch => self.persistent(),
+            0x81 if self.dialect != Dialect::NumPy => self.new_object(),
             _ => {
                 self.cursor.refuse(format!("opcode 0x{code:02x}{} is not read", opcode_name(code)))
             }
@@ -279,8 +291,14 @@ impl<'a> Machine<'a> {
     }
 
     fn lookup(&self, module: &str, name: &str) -> Option<Global> {
-        let torch = || torch::global(module, name).filter(|_| self.dialect == Dialect::Torch);
-        numpy::global(module, name).or_else(|| torch().map(Global::Torch))
+        let torch = || torch::global(module, name).map(Global::Torch);
+        let scikit = || scikit::global(module, name);
+        let others = || match self.dialect {
+            Dialect::NumPy => None,
+            Dialect::Estimators => scikit(),
+            Dialect::Torch => torch().or_else(scikit),
+        };
+        numpy::global(module, name).or_else(others)
     }
 
     /// Sets the state of an object; of a dictionary or of settings it is not kept.
@@ -288,26 +306,40 @@ impl<'a> Machine<'a> {
         let state = self.pop()?;
         let target = self.top()?;
         if let Node::Object(id) = target
-            && self.dialect == Dialect::Torch
-            && matches!(self.arena.get(id), Object::Dict(_) | Object::Inert)
+            && self.dialect != Dialect::NumPy
         {
-            return Ok(());
+            match self.arena.get(id) {
+                Object::Dict(_) | Object::Inert => return Ok(()),
+                Object::Record { .. } => {
+                    let built = scikit::build(&mut self.arena, id, state);
+                    return built.or_else(|reason| self.refuse(format!("BUILD: {reason}")));
+                }
+                _ => {}
+            }
         }
         numpy::build(&mut self.arena, target, state).or_else(|reason| self.refuse(reason))
     }
 
-    /// BINPERSID, a storage, and NEWOBJ, settings.
-    fn torch(&mut self, code: u8) -> Result<(), Refusal> {
+    /// BINPERSID, a storage.
+    fn persistent(&mut self) -> Result<(), Refusal> {
         let argument = self.pop()?;
-        if code == b'Q' {
-            return match torch::persistent(&self.arena, argument) {
-                Ok(object) => self.make(object),
-                Err(reason) => self.refuse(format!("BINPERSID: {reason}")),
-            };
+        match torch::persistent(&self.arena, argument) {
+            Ok(object) => self.make(object),
+            Err(reason) => self.refuse(format!("BINPERSID: {reason}")),
         }
-        match self.pop()? {
-            Node::Global(Global::Torch(Name::Inert)) => self.make(Object::Inert),
-            _ => self.refuse("NEWOBJ: makes what is not on the list"),
+    }
+
+    /// NEWOBJ, settings or an estimator.
+    fn new_object(&mut self) -> Result<(), Refusal> {
+        let (arguments, class) = (self.pop()?, self.pop()?);
+        let made = match class {
+            Node::Global(Global::Torch(Name::Inert)) => Ok(Object::Inert),
+            Node::Global(Global::Estimator(class)) => scikit::new(&self.arena, class, arguments),
+            _ => Err("makes what is not on the list".to_owned()),
+        };
+        match made {
+            Ok(object) => self.make(object),
+            Err(reason) => self.refuse(format!("NEWOBJ: {reason}")),
         }
     }
 
@@ -319,6 +351,11 @@ impl<'a> Machine<'a> {
         let at = self.cursor.opcode_at();
         let made = match function {
             Global::Torch(name) => torch::reduce(&mut self.arena, name, arguments, at),
+            Global::DefaultDict => Ok(self.arena.add(Object::Dict(Vec::new()), at)),
+            Global::Reconstructor => match scikit::reconstructed(&self.arena, arguments) {
+                Ok(object) => Ok(self.arena.add(object, at)),
+                Err(reason) => Err(reason),
+            },
             function => numpy::reduce(&mut self.arena, function, arguments, at),
         };
         match made {

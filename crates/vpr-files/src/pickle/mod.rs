@@ -9,7 +9,8 @@
 //! [`MAX_EXPANSION`] times as many bytes and objects as the pickle has bytes, nested at most
 //! [`MAX_DEPTH`] levels deep.
 //!
-//! PyTorch's checkpoints have a dialect of their own, [`decode_checkpoint`].
+//! PyTorch's checkpoints have a dialect of their own, [`decode_checkpoint`], and so have files of
+//! scikit-learn's estimators, [`decode_estimators`].
 //!
 //! ```
 //! use vpr_files::pickle::{Value, decode};
@@ -25,6 +26,7 @@ mod cursor;
 mod machine;
 mod numpy;
 mod object;
+mod scikit;
 mod text;
 mod torch;
 mod unfold;
@@ -57,10 +59,23 @@ pub fn read(path: &Path) -> Result<Value> {
     decode(&bytes).map_err(|refusal| refusal.in_file(path, 0))
 }
 
+/// Decodes one pickle that fills all of `bytes` and may hold estimators of scikit-learn.
+///
+/// Beside what [`decode`] reads, `PCA`, `KMeans` and `MiniBatchKMeans` are [`Value::Record`], and ordered
+/// dictionaries and those with a default are dictionaries. Nothing is called.
+///
+/// # Errors
+///
+/// As [`decode`].
+pub fn decode_estimators(bytes: &[u8]) -> Result<Value, Refusal> {
+    let (root, arena) = machine::run_estimators(bytes)?;
+    unfold::unfold(root, &arena, bytes.len())
+}
+
 /// Decodes the checkpoint's pickle that `bytes` begin with; returns its value and its length.
 ///
 /// Beside what [`decode`] reads, tensors are [`Value::Tensor`], ordered
-/// dictionaries are dictionaries, and settings that lie beside weights (`argparse.Namespace`,
+/// dictionaries are dictionaries, estimators of scikit-learn are [`Value::Record`], and settings that lie beside weights (`argparse.Namespace`,
 /// paths, devices) are [`Value::None`]. Nothing is called.
 ///
 /// # Errors

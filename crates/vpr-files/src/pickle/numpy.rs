@@ -59,6 +59,7 @@ pub(super) fn reduce<'a>(
         (Global::Bytes, []) => Object::Bytes(Vec::new()),
         (Global::Torch(name), _) => return Err(format!("{name:?} is not of NumPy")),
         (Global::Ndarray, _) => return Err("numpy.ndarray is not called".into()),
+        (Global::Estimator(class), _) => return Err(format!("{class} is not called")),
         _ => return Err(wrong()),
     };
     Ok(arena.add(object, at))

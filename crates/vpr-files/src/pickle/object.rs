@@ -20,7 +20,7 @@ pub(super) enum Node<'a> {
     Object(usize),
 }
 
-/// What only checkpoints name.
+/// What checkpoints name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Name {
     /// `collections.OrderedDict`.
@@ -52,7 +52,15 @@ pub(super) enum Global {
     Encode,
     /// `bytes`, only called without arguments.
     Bytes,
-    /// What only checkpoints of PyTorch name.
+    /// A class of scikit-learn, by its name.
+    Estimator(&'static str),
+    /// `copyreg._reconstructor`, only called with an estimator.
+    Reconstructor,
+    /// `object`, only as an argument of the last.
+    ObjectBase,
+    /// `collections.defaultdict`, read as a dictionary whatever its default.
+    DefaultDict,
+    /// What checkpoints of PyTorch name.
     Torch(Name),
 }
 
@@ -74,6 +82,11 @@ pub(super) enum Object<'a> {
         len: usize,
     },
     Tensor(Tensor),
+    /// An estimator of scikit-learn; its fields are a dictionary.
+    Record {
+        class: &'static str,
+        fields: Option<usize>,
+    },
     /// Settings beside weights; what they hold is not kept.
     Inert,
 }

@@ -82,6 +82,16 @@ impl<'a> Unfolder<'_, 'a> {
                 self.spend(tensor.storage.len() + 2 * tensor.shape.len(), id, ())?;
                 Value::Tensor(tensor.clone())
             }
+            Object::Record { fields: None, .. } => {
+                return arena.refuse(id, "the estimator has no fields");
+            }
+            Object::Record { class, fields: Some(fields) } => {
+                self.spend(class.len(), id, ())?;
+                let Value::Dict(fields) = self.object(*fields, depth + 1)? else {
+                    return arena.refuse(id, "the fields of an estimator are not a dict");
+                };
+                Value::Record { class: (*class).to_owned(), fields }
+            }
             Object::Inert => Value::None,
         })
     }

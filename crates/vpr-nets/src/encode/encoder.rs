@@ -2,7 +2,7 @@
 
 use burn::tensor::{Device, Tensor};
 
-use super::Preprocessing;
+use super::{Preprocessing, registry::Matching};
 
 /// A network that gives one global descriptor per image.
 pub trait Encoder: Send + Sync {
@@ -30,6 +30,11 @@ pub trait Encoder: Send + Sync {
     /// Whether a descriptor depends on the other images of its batch, as `CricaVPR`'s does.
     fn batch_dependent(&self) -> bool {
         false
+    }
+
+    /// How its descriptors are compared.
+    fn matching(&self) -> Matching {
+        Matching::Euclidean
     }
 
     /// Digest of its weights' file, `sha256:…`; `None` if there was none.

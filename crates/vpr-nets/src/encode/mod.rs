@@ -7,6 +7,7 @@
 mod batches;
 mod caffe;
 mod encoder;
+pub mod l1;
 mod netvlad_mobile;
 mod network;
 mod preprocessing;

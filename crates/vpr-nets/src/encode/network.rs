@@ -14,7 +14,7 @@ use vpr_core::{Definition, Error};
 use super::{
     Encoder, Preprocessing, Size, caffe,
     netvlad_mobile::NetVladMobile,
-    registry::{Architecture, Method},
+    registry::{Architecture, Matching, Method},
 };
 use crate::{
     Result,
@@ -59,6 +59,7 @@ pub struct Network {
     dimension: usize,
     preprocessing: Preprocessing,
     batch_dependent: bool,
+    matching: Matching,
     digest: Option<String>,
     prefix: Option<String>,
     device: Device,
@@ -71,6 +72,8 @@ pub(super) struct Ready {
     /// What its weights say of its dimension; `None` if they fit one only.
     pub(super) dimension: Option<usize>,
     pub(super) digest: String,
+    /// Whether it subtracts a mean of its own, so that images keep theirs.
+    pub(super) has_mean: bool,
     pub(super) forward: Forward,
     pub(super) accepts: Accepts,
 }
@@ -98,6 +101,10 @@ impl Encoder for Network {
 
     fn batch_dependent(&self) -> bool {
         self.batch_dependent
+    }
+
+    fn matching(&self) -> Matching {
+        self.matching
     }
 
     fn weights_digest(&self) -> Option<&str> {
@@ -150,8 +157,12 @@ pub fn by_request(request: &Request) -> Result<Box<dyn Encoder>> {
         let reason = "the weights give descriptors of another length";
         return Err(Error::Parameter { name, value: dimension.to_string(), reason }.into());
     }
+    if network.has_mean {
+        preprocessing.mean = [0.0; 3];
+    }
     Ok(Box::new(Network {
         name: method.name.clone(),
+        matching: method.matching,
         dimension: actual,
         preprocessing,
         batch_dependent: method.architecture == Architecture::CricaVpr,
@@ -224,6 +235,7 @@ where
     Ok(Ready {
         dimension: None,
         digest: report.digest,
+        has_mean: false,
         forward: Box::new(move |images| forward(&module, images)),
         accepts: Box::new(|_, _| Ok(())),
     })
@@ -247,6 +259,7 @@ fn published(model: impl Model + 'static) -> Ready {
     Ready {
         dimension: Some(model.dimension()),
         digest: model.report().digest.clone(),
+        has_mean: false,
         forward: Box::new(move |images| model.describe(images)),
         accepts: Box::new(move |height, width| accepting.accepts(height, width)),
     }

@@ -72,6 +72,24 @@ pub struct Method {
     resize: ResizeEntry,
     #[serde(default)]
     equalize: bool,
+    /// Files that are read with its own if one lies in the same folder: the first that does.
+    #[serde(default)]
+    beside: Vec<String>,
+    /// How its descriptors are compared.
+    #[serde(default)]
+    pub matching: Matching,
+}
+
+/// How descriptors of a method are compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Matching {
+    /// By distance, or by cosine, which ranks unit vectors alike.
+    #[default]
+    Euclidean,
+    /// By the sum of absolute differences, as AMOSNet and HybridNet:
+    /// [`similarities`](super::l1::similarities).
+    L1,
 }
 
 /// The networks that are built here.
@@ -269,7 +287,7 @@ impl Method {
         Weights::read(self.file(self.dimensions[0]).as_ref(), DEFAULT_ENCODER)
     }
 
-    /// What [`Self::locate`] finds, read; or why it is not there.
+    /// What [`Self::locate`] finds, read, and what lies beside it; or why it is not there.
     pub(super) fn weights(
         &self,
         given: Option<&Path>,
@@ -277,7 +295,7 @@ impl Method {
         roots: &[PathBuf],
     ) -> Result<Weights> {
         if let Some(path) = given {
-            return Weights::open(path);
+            return self.with_beside(path);
         }
         let place = self.locate(dimension, roots).ok_or_else(|| {
             let searched: Vec<_> = roots.iter().map(|it| it.display().to_string()).collect();
@@ -300,9 +318,26 @@ impl Method {
             crate::Error::format(self.file(dimension), "weights", reason)
         })?;
         match place {
-            Place::File(path) => Weights::open(&path),
+            Place::File(path) => self.with_beside(&path),
             Place::BuiltIn => self.built_in_weights(),
         }
+    }
+
+    /// The weights of a file, with those of the first file of [`Self::beside`] in its folder.
+    fn with_beside(&self, path: &Path) -> Result<Weights> {
+        let weights = Weights::open(path)?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let beside = self.beside.iter().map(|file| folder.join(file)).find(|path| path.is_file());
+        match beside {
+            Some(beside) => weights.joined(Weights::open(&beside)?),
+            None => Ok(weights),
+        }
+    }
+
+    /// Files that are read with its own if they lie in the same folder.
+    #[must_use]
+    pub fn beside(&self) -> &[String] {
+        &self.beside
     }
 
     /// How images become its input.

@@ -164,12 +164,18 @@ pub fn gem_resnet50(weights: Weights, device: &Device) -> Result<Loaded<Parts<Re
 const WHITENING_POWER: f32 = 0.25;
 
 /// AP-GeM on ResNet-101: `Resnet-101-AP-GeM.pt` of `naver/deep-image-retrieval`, with the whitening that
-/// lies beside its weights as tensors `pca.mean`, `pca.components` and `pca.explained_variance`.
+/// lies beside its weights, `pca['Landmarks_clean']`, or as tensors `pca.mean`, `pca.components` and
+/// `pca.explained_variance`.
 ///
 /// # Errors
 ///
 /// As [`open`](super::open).
-pub fn ap_gem(mut weights: Weights, device: &Device) -> Result<Loaded<Parts<ResNet, GemWhitened>>> {
+pub fn ap_gem(weights: Weights, device: &Device) -> Result<Loaded<Parts<ResNet, GemWhitened>>> {
+    // The checkpoint's own names; of its other whitenings, and of what else a PCA holds, nothing is used.
+    let mut weights = weights.renamed(&[
+        (r"^pca\.Landmarks_clean\.(mean|components|explained_variance)_$", "pca.$1"),
+        (r"^pca\..*_$", ""),
+    ])?;
     let shapes = Shapes::new(&weights, "");
     let (to, from) = (shapes.axis("pca.components", 0)?, shapes.axis("pca.components", 1)?);
     let mean = weights.take("pca.mean", &[from])?;

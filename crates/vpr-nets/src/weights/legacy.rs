@@ -1,10 +1,15 @@
 //! Checkpoints before PyTorch 1.6: five pickles, then the storages one after another.
 
-use std::{borrow::Cow, collections::HashMap, ops::Range, path::Path};
+use std::{
+    borrow::Cow,
+    collections::{BTreeMap, HashMap},
+    ops::Range,
+    path::Path,
+};
 
 use vpr_files::pickle::{Element, Value, decode_checkpoint};
 
-use super::{Tensor, checkpoint, storage};
+use super::{Tensor, checkpoint, estimators, storage};
 use crate::{Error, Result};
 
 /// The first pickle, a long number, and the start of the second.
@@ -17,11 +22,8 @@ pub(super) fn is_legacy(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 
-/// All tensors of a file.
-pub(super) fn read(
-    path: &Path,
-    bytes: &[u8],
-) -> Result<std::collections::BTreeMap<String, Tensor>> {
+/// All tensors of a file, and the arrays of the estimators beside them.
+pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<[BTreeMap<String, Tensor>; 2]> {
     let mut at = MAGIC.len();
     let mut next = || {
         let start = at;
@@ -40,15 +42,17 @@ pub(super) fn read(
     }
     let (root, _) = next()?;
     let (keys, start) = next()?;
+    let arrays = estimators::arrays(path, &root)?;
     let views = checkpoint::views(path, root)?;
     let elements = views.values().map(|view| (view.storage.as_str(), view.element)).collect();
     let places = places(path, bytes, start, keys, &elements)?;
-    storage::tensors(path, views.clone(), bytes.len(), |view| {
+    let tensors = storage::tensors(path, views.clone(), bytes.len(), |view| {
         match places.get(view.storage.as_str()) {
             Some(place) => Ok(Cow::Borrowed(&bytes[place.clone()])),
             None => Err(Error::format(path, &view.storage, "the storage is not in the file")),
         }
-    })
+    })?;
+    Ok([tensors, arrays])
 }
 
 fn is_little_endian(system: &Value) -> bool {

@@ -1,7 +1,8 @@
 //! Published weights: read key by key, never executed.
 //!
 //! `.pth`/`.pt` files of PyTorch (zip archives since 1.6, and the older sequence of pickles) and
-//! `.safetensors`, told apart by content; Caffe's `.caffemodel`, by its name. All become f32; a NaN or infinity is refused.
+//! `.safetensors`, told apart by content; by their names Caffe's `.caffemodel`, mean images (`.binaryproto`,
+//! `.npy`) and `.pkl`, scikit-learn's estimators. All become f32; a NaN or infinity is refused.
 //! The reader is our own: pickles are decoded by `vpr-core`, a fixed list of opcodes and names,
 //! and what is allocated is bounded by the length of the file.
 //!
@@ -20,7 +21,9 @@
 mod apply;
 mod caffe;
 mod checkpoint;
+mod estimators;
 mod legacy;
+mod mean_image;
 mod prefix;
 mod safetensors;
 mod save;
@@ -33,6 +36,7 @@ use std::{collections::BTreeMap, fmt, fs, path::Path};
 use burn::store::{KeyRemapper, ModuleSnapshot};
 use sha2::{Digest as _, Sha256};
 
+pub(crate) use mean_image::MEAN_IMAGE;
 pub use prefix::{Fitted, fit};
 pub use save::{Precision, save};
 pub(crate) use shapes::Shapes;
@@ -107,7 +111,10 @@ impl Weights {
     ///
     /// Of a checkpoint that is a dictionary with an entry `state_dict`, `model_state_dict` or
     /// `model`, that entry is read; other nested dictionaries are flattened, keys joined by dots.
-    /// A prefix `module.` that all keys share is removed. What is no tensor is left out.
+    /// A prefix `module.` that all keys share is removed. Of estimators of scikit-learn, which AP-GeM's
+    /// checkpoint has beside its weights and `.pkl` files are, arrays are tensors, such as
+    /// `pca.Landmarks_clean.mean_`; what else is no tensor is left out. A mean image is the tensor
+    /// `mean_image`.
     ///
     /// # Errors
     ///
@@ -124,12 +131,21 @@ impl Weights {
     /// Those of [`Self::open`], reading apart.
     pub fn read(path: &Path, bytes: &[u8]) -> Result<Self> {
         let mut facts = BTreeMap::new();
+        let mut beside = BTreeMap::new();
         let tensors = if caffe::is_caffe(path) {
             caffe::read(path, bytes)?
+        } else if estimators::is_pickle(path) {
+            estimators::read(path, bytes)?
+        } else if mean_image::is_mean_image(path) {
+            mean_image::read(path, bytes)?
         } else if zip::is_archive(bytes) {
-            zip::read(path, bytes)?
+            let [tensors, arrays] = zip::read(path, bytes)?;
+            beside = arrays;
+            tensors
         } else if legacy::is_legacy(bytes) {
-            legacy::read(path, bytes)?
+            let [tensors, arrays] = legacy::read(path, bytes)?;
+            beside = arrays;
+            tensors
         } else {
             facts = safetensors::facts(path, bytes)?;
             safetensors::read(path, bytes)?
@@ -137,7 +153,11 @@ impl Weights {
         if tensors.is_empty() {
             return Err(Error::format(path, "content", "there is no tensor in it"));
         }
-        let tensors = storage::without_shared_prefix(tensors);
+        let mut tensors = storage::without_shared_prefix(tensors);
+        // Weights are first, should one be called like an array.
+        tensors.extend(
+            beside.into_iter().filter(|(key, _)| !tensors.contains_key(key)).collect::<Vec<_>>(),
+        );
         let digest = hexadecimal(&Sha256::digest(bytes));
         Ok(Self { path: path.to_owned(), digest, facts, tensors })
     }
@@ -170,6 +190,28 @@ impl Weights {
     #[must_use]
     pub fn get(&self, key: &str) -> Option<&Tensor> {
         self.tensors.get(key)
+    }
+
+    /// These with those of another file, whose keys must be others; the digest is that of both digests.
+    ///
+    /// # Errors
+    ///
+    /// [`vpr_core::Error::Format`] if both have a key.
+    pub fn joined(mut self, other: Self) -> Result<Self> {
+        for (key, tensor) in other.tensors {
+            if self.tensors.contains_key(&key) {
+                let reason = format!("{} has it too", self.path.display());
+                return Err(Error::format(&other.path, key, reason));
+            }
+            self.tensors.insert(key, tensor);
+        }
+        self.digest = hexadecimal(&Sha256::digest(format!("{}{}", self.digest, other.digest)));
+        Ok(self)
+    }
+
+    /// Takes the tensor of `key` out, whatever its shape.
+    pub(crate) fn take_any(&mut self, key: &str) -> Option<Tensor> {
+        self.tensors.remove(key)
     }
 
     /// Takes the tensor of `key` out, which must have `shape`.

@@ -10,7 +10,7 @@ use std::{
 use vpr_files::pickle::decode_checkpoint;
 use zip::{CompressionMethod, ZipArchive};
 
-use super::{Tensor, checkpoint, storage};
+use super::{Tensor, checkpoint, estimators, storage};
 use crate::{Error, Result};
 
 /// Whether a file begins like an archive.
@@ -18,8 +18,8 @@ pub(super) fn is_archive(bytes: &[u8]) -> bool {
     bytes.starts_with(b"PK\x03\x04")
 }
 
-/// All tensors of a file.
-pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<BTreeMap<String, Tensor>> {
+/// All tensors of a file, and the arrays of the estimators beside them.
+pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<[BTreeMap<String, Tensor>; 2]> {
     let mut archive = Archive::open(path, bytes)?;
     if archive.stored("byteorder")?.is_some_and(|order| order != b"little") {
         return Err(Error::format(path, "byteorder", "written by a big-endian machine"));
@@ -31,13 +31,15 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<BTreeMap<String, Tensor>
         let place = format!("data.pkl: byte {}", refusal.offset);
         Error::format(path, place, refusal.reason)
     })?;
+    let arrays = estimators::arrays(path, &root)?;
     let views = checkpoint::views(path, root)?;
-    storage::tensors(path, views, bytes.len(), |view| {
+    let tensors = storage::tensors(path, views, bytes.len(), |view| {
         let name = format!("data/{}", view.storage);
         let data = archive.stored(&name)?;
         data.map(Cow::Borrowed)
             .ok_or_else(|| Error::format(path, name, "the storage is not in the archive"))
-    })
+    })?;
+    Ok([tensors, arrays])
 }
 
 struct Archive<'a> {

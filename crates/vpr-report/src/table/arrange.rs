@@ -1,6 +1,6 @@
 //! A table as blocks that are no wider than the page: whole, in parts of its columns, or row by row.
 
-use super::{Cell, Table, Value, notes::Notes, number};
+use super::{Cell, Table, notes::Notes, number};
 use vpr_core::Provenance;
 
 /// Between two columns, borders included.
@@ -64,14 +64,12 @@ impl<'a> Pivot<'a> {
                     (cell.provenance, cell.definition.as_deref()) == (provenance, definition)
                 };
                 let group: Vec<&Cell> = cells.iter().filter(of_group).copied().collect();
-                let best = best(table, &group);
-                has_best |= best.is_some();
+                has_best |= group.iter().any(|cell| cell.best);
                 let entry = |column: &&str| {
                     let cell = group.iter().find(|cell| cell.column == *column);
                     cell.map_or_else(String::new, |cell| {
                         let text = entry(table, cell);
-                        let is_best = best.is_some_and(|best| std::ptr::eq(best, *cell));
-                        (if is_best { emphasis(text) } else { text }) + &notes.mark(cell)
+                        (if cell.best { emphasis(text) } else { text }) + &notes.mark(cell)
                     })
                 };
                 let entries = columns.iter().map(entry).collect();
@@ -227,24 +225,6 @@ fn entry(table: &Table, cell: &Cell) -> String {
         None => "",
     };
     format!("{value}{mark}")
-}
-
-/// The highest of the values with intervals, if its interval lies above all others.
-fn best<'a>(table: &Table, group: &[&'a Cell]) -> Option<&'a Cell> {
-    if !table.highest_is_best {
-        return None;
-    }
-    let contend = |cell: &&&'a Cell| {
-        cell.interval.is_some() && cell.value.as_ref().and_then(Value::number).is_some()
-    };
-    let contenders: Vec<&Cell> = group.iter().filter(contend).copied().collect();
-    let low = |cell: &Cell| cell.interval.as_ref().map_or(f64::NEG_INFINITY, |it| it.low);
-    let high = |cell: &Cell| cell.interval.as_ref().map_or(f64::INFINITY, |it| it.high);
-    let best = *contenders.iter().max_by(|a, b| low(a).total_cmp(&low(b)))?;
-    let others = contenders.iter().filter(|it| !std::ptr::eq(**it, best));
-    let mut highs = others.map(|it| high(it)).peekable();
-    highs.peek()?;
-    highs.all(|high| high < low(best)).then_some(best)
 }
 
 /// The distinct items, in order of first appearance.

@@ -48,7 +48,7 @@ pub struct Checked {
 /// Compares a table with the committed page and with the expected numbers.
 ///
 /// Every computed cell must stand on the page with the same value, number of items, interval,
-/// thesis value and note; timings are left alone. Every `generated` cell of the page must have been
+/// thesis value and note, best or not; timings are left alone. Every `generated` cell of the page must have been
 /// computed, since it needs no data, but those whose row or column names one of `without`, methods
 /// whose weights are not at hand; others may be missing where something is absent. Every
 /// expectation must be about a cell that was computed or stands on the page.
@@ -149,6 +149,8 @@ fn differences(cell: &Cell, page: &Cell) -> Vec<Finding> {
     differ("thesis", is_same, text(page.thesis.as_ref()), text(cell.thesis.as_ref()));
     let note = |cell: &Cell| format!("`{}`", cell.note.as_deref().unwrap_or_default());
     differ("note", page.note == cell.note, note(page), note(cell));
+    let is_best = |cell: &Cell| if cell.best { "yes" } else { "no" }.to_owned();
+    differ("best of its row", page.best == cell.best, is_best(page), is_best(cell));
     findings
 }
 

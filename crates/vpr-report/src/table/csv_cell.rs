@@ -5,6 +5,9 @@ use vpr_core::Provenance;
 
 use super::{Cell, Interval, Value};
 
+/// What stands in the column `best` where a cell is.
+const BEST: &str = "yes";
+
 /// The columns, in order.
 #[derive(Serialize, Deserialize)]
 pub(super) struct CsvCell {
@@ -19,10 +22,14 @@ pub(super) struct CsvCell {
     high: Option<f64>,
     interval: Option<String>,
     note: Option<String>,
+    /// A column of tables that have a best, `yes` or nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    best: Option<String>,
 }
 
-impl From<&Cell> for CsvCell {
-    fn from(cell: &Cell) -> Self {
+impl CsvCell {
+    /// A line; with the column of what is best, if the table has it.
+    pub(super) fn new(cell: &Cell, has_best: bool) -> Self {
         let interval = cell.interval.as_ref();
         Self {
             row: cell.row.clone(),
@@ -36,6 +43,7 @@ impl From<&Cell> for CsvCell {
             high: interval.map(|it| it.high),
             interval: interval.map(|it| it.method.clone()),
             note: cell.note.clone(),
+            best: has_best.then(|| if cell.best { BEST } else { "" }.to_owned()),
         }
     }
 }
@@ -44,6 +52,11 @@ impl TryFrom<CsvCell> for Cell {
     type Error = &'static str;
 
     fn try_from(line: CsvCell) -> Result<Self, Self::Error> {
+        let best = match line.best.as_deref() {
+            None | Some("") => false,
+            Some(BEST) => true,
+            Some(_) => return Err("`best` is `yes` or empty"),
+        };
         let interval = match (line.low, line.high, line.interval) {
             (Some(low), Some(high), Some(method)) => Some(Interval { low, high, method }),
             (None, None, None) => None,
@@ -55,6 +68,7 @@ impl TryFrom<CsvCell> for Cell {
             definition: line.definition,
             interval,
             note: line.note,
+            best,
             ..Self::new(line.row, line.column, 0.0, line.provenance, line.n)
         })
     }

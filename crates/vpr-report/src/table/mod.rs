@@ -83,6 +83,9 @@ pub struct Cell {
     pub interval: Option<Interval>,
     /// What a reader must know, or why it is absent.
     pub note: Option<String>,
+    /// Whether a paired test on the same queries tells it from every other of its row.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub best: bool,
     /// Whether it differs from run to run (a timing): printed, but kept out of pages and checks.
     #[serde(skip)]
     pub volatile: bool,
@@ -111,6 +114,7 @@ impl Cell {
             n,
             interval: None,
             note: None,
+            best: false,
             volatile: false,
             quiet: false,
         }
@@ -209,22 +213,13 @@ pub struct Table {
     /// Decimals the thesis prints and how it gets them; `None` if agreement is not judged.
     #[serde(skip)]
     pub rounding: Option<(Rounding, u32)>,
-    /// Whether high values are good, so that the best of a row may stand out.
-    #[serde(skip)]
-    pub highest_is_best: bool,
 }
 
 impl Table {
     /// An empty table.
     #[must_use]
     pub fn new(id: impl Into<String>, title: impl Into<String>) -> Self {
-        Self {
-            id: id.into(),
-            title: title.into(),
-            cells: Vec::new(),
-            rounding: None,
-            highest_is_best: false,
-        }
+        Self { id: id.into(), title: title.into(), cells: Vec::new(), rounding: None }
     }
 
     /// Adds a cell.

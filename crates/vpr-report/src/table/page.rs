@@ -143,6 +143,7 @@ mod tests {
         let mut cell = Cell::new("a, \"b\"", "c", 0.1 + 0.2, Provenance::Measured, 3);
         cell.thesis = Some(Value::Text("✓".to_owned()));
         table.push(cell.defined("corrected").noted("line\nbreak").within(0.1, 0.4, "Wilson"));
+        table.cells[0].best = true;
         table.push(Cell::absent("a", "c", "no data"));
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("table-0.csv");

@@ -92,10 +92,11 @@ fn html(block: &Block) -> String {
 }
 
 /// Cells as CSV with a header, one per line.
-pub(super) fn csv<'a>(cells: impl Iterator<Item = &'a Cell>) -> String {
+pub(super) fn csv<'a>(cells: impl Iterator<Item = &'a Cell> + Clone) -> String {
+    let has_best = cells.clone().any(|cell| cell.best);
     let mut writer = csv::Writer::from_writer(Vec::new());
     for cell in cells {
-        writer.serialize(CsvCell::from(cell)).expect("writing to memory");
+        writer.serialize(CsvCell::new(cell, has_best)).expect("writing to memory");
     }
     String::from_utf8(writer.into_inner().expect("writing to memory")).expect("labels are UTF-8")
 }
@@ -153,8 +154,8 @@ fn wrapped(text: &str, width: usize) -> String {
 fn notes(pivot: &Pivot<'_>, best: &str) -> String {
     let best = if pivot.has_best {
         format!(
-            "{best}the best of its row, its 95 % interval above all others'; intervals that \
-             overlap may still differ.\n"
+            "{best}better than every other of its row by a paired test on the same queries, level \
+             .05 after Holm's correction for all pairs.\n"
         )
     } else {
         String::new()
@@ -201,20 +202,23 @@ mod tests {
     }
 
     #[test]
-    fn the_best_stands_out_only_beyond_the_intervals() {
+    fn the_best_stands_out_only_where_a_test_said_so() {
         let mut table = Table::new("table-0", "t");
-        for (row, low) in [("sure", 0.7), ("unsure", 0.5)] {
+        for row in ["sure", "unsure"] {
             let cell = |column, value| Cell::new(row, column, value, Provenance::Measured, 99);
-            table.push(cell("base rate", 0.99));
             table.push(cell("HOG", 0.5).within(0.4, 0.6, "bootstrap"));
-            table.push(cell("CALC", 0.75).within(low, 0.8, "bootstrap"));
+            table.push(cell("CALC", 0.75).within(0.7, 0.8, "bootstrap"));
         }
-        assert!(!table.render(Format::Markdown).contains("**"), "nobody said that high is good");
-        table.highest_is_best = true;
+        assert!(!table.render(Format::Markdown).contains("**"), "nobody tested");
+        assert!(!table.render(Format::Csv).contains("best"));
+        table.cells[1].best = true;
         let text = table.render(Format::Markdown);
         assert!(text.contains("**.750 ± .05**") && text.matches("**").count() == 2, "{text}");
-        assert!(text.contains("Bold: the best of its row"), "{text}");
+        assert!(text.contains("Bold: better than every other of its row"), "{text}");
         assert!(table.render(Format::Table).contains(".750 ± .05 *"));
+        let csv = table.render(Format::Csv);
+        assert!(csv.lines().next().unwrap().ends_with(",note,best"), "{csv}");
+        assert_eq!(csv.lines().filter(|it| it.ends_with(",yes")).count(), 1, "{csv}");
     }
 
     #[test]

@@ -203,6 +203,7 @@ pub(crate) fn open(recipe: &Recipe, folder: &Path) -> vpr_core::Result<Dataset> 
         },
         spacing_m: None,
         frames: None,
+        every: None,
         origin: format!("generated; counterpart: {}", recipe.counterpart),
         licence: "that of this toolkit".to_owned(),
         note: None,
