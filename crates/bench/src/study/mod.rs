@@ -40,6 +40,7 @@ pub use chronology::Published;
 pub use invariance::Stage;
 pub use platform_speed::TechniqueTiming;
 pub use sheets::Scene;
+pub use vocabularies::Vocabularies;
 use vpr_study::{Runner, Sources, Technique, technique::hand_crafted_names};
 pub use worlds::{Domain, Likeness, Worlds};
 
@@ -175,16 +176,7 @@ pub enum Study {
         datasets: Vec<String>,
     },
     /// Techniques with a vocabulary that every clone has, beside others: dense-vlad.
-    Vocabularies {
-        /// Techniques, by name.
-        techniques: Vec<String>,
-        /// Datasets, by id.
-        datasets: Vec<String>,
-        /// Techniques whose stored matches stand beside.
-        stored: Vec<Technique>,
-        /// Where a dataset has more pairs of images, `CoHOG`, which compares regions, is left out.
-        max_cohog_pairs: usize,
-    },
+    Vocabularies(Vocabularies),
     /// How often a radius and what two images share disagree: overlap.
     Overlap {
         /// Generated places whose recipe asks for `overlap`.
@@ -307,10 +299,8 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         Study::Winners { datasets } => {
             winners::run(&mut table, datasets, context).map(no_figure)?
         }
-        Study::Vocabularies { techniques, datasets, stored, max_cohog_pairs } => {
-            let max_cohog_pairs = *max_cohog_pairs;
-            let compared = vocabularies::Compared { techniques, datasets, stored, max_cohog_pairs };
-            vocabularies::run(&mut table, &compared, context).map(no_figure)?
+        Study::Vocabularies(study) => {
+            vocabularies::run(&mut table, study, context).map(no_figure)?
         }
         Study::Overlap { worlds, radii } => {
             overlap::run(&mut table, worlds, radii, context).map(no_figure)?

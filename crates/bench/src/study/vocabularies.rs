@@ -1,5 +1,6 @@
 //! Techniques with a vocabulary that every clone has, beside others and beside the author's files: dense-vlad.
 
+use serde::Deserialize;
 use vpr_core::{
     Definition, Error, Provenance, Result,
     metrics::{
@@ -16,26 +17,28 @@ use super::{Context, best};
 /// The N of R@N.
 const RANKS: [usize; 2] = [1, 5];
 
-/// What is compared.
-pub(super) struct Compared<'a> {
+/// What is compared, and on what.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Vocabularies {
     /// Techniques by name, the ones with a vocabulary and those beside them.
-    pub(super) techniques: &'a [String],
+    pub techniques: Vec<String>,
     /// Datasets, by id.
-    pub(super) datasets: &'a [String],
+    pub datasets: Vec<String>,
     /// Techniques whose stored matches stand beside.
-    pub(super) stored: &'a [Technique],
-    /// Where a dataset has more pairs of images, `CoHOG` is left out.
-    pub(super) max_cohog_pairs: usize,
+    pub stored: Vec<Technique>,
+    /// Where a dataset has more pairs of images, `CoHOG`, which compares regions, is left out.
+    pub max_cohog_pairs: usize,
 }
 
-pub(super) fn run(table: &mut Table, compared: &Compared<'_>, context: Context<'_>) -> Result<()> {
+pub(super) fn run(table: &mut Table, study: &Vocabularies, context: Context<'_>) -> Result<()> {
     let sources = context.sources;
-    let runners: Vec<Runner> = compared
+    let runners: Vec<Runner> = study
         .techniques
         .iter()
         .filter_map(|name| sources.runner(name).transpose())
         .collect::<Result<_>>()?;
-    for id in compared.datasets {
+    for id in &study.datasets {
         let Some(dataset) = sources.images(id)? else {
             let why = sources.why_absent(id, "images")?;
             let name = sources.entry(id)?.name;
@@ -53,7 +56,7 @@ pub(super) fn run(table: &mut Table, compared: &Compared<'_>, context: Context<'
             Ok(subject.noted(note))
         };
         let n_pairs = dataset.queries.len() * dataset.references.len();
-        let is_left_out = |it: &&Runner| it.name == "cohog" && n_pairs > compared.max_cohog_pairs;
+        let is_left_out = |it: &&Runner| it.name == "cohog" && n_pairs > study.max_cohog_pairs;
         let computed = runners
             .iter()
             .filter(|it| !is_left_out(it))
@@ -62,7 +65,7 @@ pub(super) fn run(table: &mut Table, compared: &Compared<'_>, context: Context<'
         let stored: Vec<Subject> = sources
             .stored_subjects(id)?
             .into_iter()
-            .filter(|it| compared.stored.iter().any(|technique| technique.name() == it.column))
+            .filter(|it| study.stored.iter().any(|technique| technique.name() == it.column))
             .collect();
         for n in RANKS {
             let row = format!("{}, R@{n}", dataset.name);

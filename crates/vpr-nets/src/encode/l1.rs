@@ -30,9 +30,9 @@ pub fn similarities(queries: &Descriptors, references: &Descriptors) -> Result<S
         let (query, reference) = (row(queries, at / m), row(references, at % m));
         of_pair(&queries.as_slice()[query], &references.as_slice()[reference])
     };
-    let values = (0..n * m).into_par_iter().map(similarity).collect();
-    let values = Array2::from_shape_vec((n, m), values).expect("one per pair");
-    Ok(Similarities::new(values)?)
+    let values: Vec<f64> = (0..n * m).into_par_iter().map(similarity).collect();
+    let of = |(query, reference)| values[query * m + reference];
+    Ok(Similarities::new(Array2::from_shape_fn((n, m), of))?)
 }
 
 /// [`similarities`] of two descriptors of one length.
