@@ -308,7 +308,6 @@ fn chosen(
     })
 }
 
-/// By recall, then by gap.
 fn is_better(new: &Score, old: &Score) -> bool {
     (new.recall, new.gap) > (old.recall, old.gap)
 }
