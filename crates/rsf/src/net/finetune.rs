@@ -319,7 +319,6 @@ fn chosen<N: Tunable>(
     })
 }
 
-/// By recall, then by gap.
 fn is_better(new: &Score, old: &Score) -> bool {
     (new.recall, new.gap) > (old.recall, old.gap)
 }

@@ -247,6 +247,7 @@ fn tunable<N: Tunable + Send + Sync + 'static>(mut network: N, weights: Weights)
     Ok(Ready {
         dimension: None,
         digest: report.digest,
+        has_mean: false,
         forward: Box::new(move |images| network.describe(images)),
         accepts: Box::new(|_, _| Ok(())),
     })
