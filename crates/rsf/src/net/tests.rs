@@ -174,8 +174,8 @@ fn between_two_networks_lie_others() {
         Weights::open(file.path()).unwrap()
     };
     let (a, b) = (saved(&start), saved(&end));
-    assert_eq!(weights(&mixture::mixed(&a, &b, 0.0).unwrap()), weights(&start));
-    let half = weights(&mixture::mixed(&a, &b, 0.5).unwrap());
+    assert_eq!(weights(&mixture::mixed(start.clone(), &a, &b, 0.0).unwrap()), weights(&start));
+    let half = weights(&mixture::mixed(start.clone(), &a, &b, 0.5).unwrap());
     assert_eq!(moved(&weights(&start), &half), ["head.bias", "head.weight"]);
     let values = |weights: &[(String, Vec<f32>)]| -> Vec<f32> {
         weights.iter().find(|it| it.0 == "head.bias").unwrap().1.clone()
