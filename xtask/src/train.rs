@@ -275,9 +275,14 @@ mod tests {
                 assert!(fs::metadata(&path).unwrap().len() <= 4 << 20, "{name} is large");
                 n += 1;
             } else if let Some(rest) = stem.strip_prefix("rsf-") {
-                let place = rest.split('-').next().unwrap();
-                let network = Network::from_str(&format!("rsf-{place}"), false).unwrap();
-                assert_eq!(command(network), ("rsf", [&RSF[..], &[place]].concat()));
+                let of_head = ["boq-", "salad-"].iter().find_map(|it| rest.strip_prefix(it));
+                let (kind, words) = match of_head {
+                    Some(_) => ("rsf-heads", &RSF_HEADS[..]),
+                    None => ("rsf", &RSF[..]),
+                };
+                let place = of_head.unwrap_or(rest).split('-').next().unwrap();
+                let network = Network::from_str(&format!("{kind}-{place}"), false).unwrap();
+                assert_eq!(command(network), ("rsf", [words, &[place]].concat()));
                 let log = path.with_extension("log.csv");
                 assert!(log.is_file() || rest.ends_with("-whitened"), "{name} has no log");
                 n_adapted += 1;

@@ -117,7 +117,7 @@ fn other_settings_are_another_run_and_wrong_ones_are_named() {
     assert!(stderr(&other).contains("margin: was 0.3, now 0.2"), "{}", stderr(&other));
     for (more, part) in [
         (&["--steps", "7"][..], "`steps` = 7"),
-        (&["--method", "cosplace"][..], "only `default`"),
+        (&["--method", "ap-gem"][..], "unknown method with gradients `ap-gem`"),
         (&["--negative-m", "900", "--checkpoints", "a"][..], "nothing to tell apart"),
         (
             &["--frozen", "stem", "--checkpoints", "b"][..],

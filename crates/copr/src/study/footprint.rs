@@ -33,7 +33,7 @@ pub(super) fn run(
     table: &mut Table,
     (scene, step_m, rooms): (&Scene, f64, &Rooms),
     places: &[Place],
-    method: &Method,
+    (method, steps): (&Method, Option<usize>),
     context: Context<'_>,
 ) -> Result<()> {
     for encoder in &rooms.encoders {
@@ -56,8 +56,9 @@ pub(super) fn run(
         let timed =
             Timed { column, sparse: &sparse, queries: &room.queries.map, targets: &targets };
         timed.push(table, &method.at(encoder), (&runner, images), context)?;
+        let Some(steps) = steps else { continue };
         let cell = if context.timings {
-            let Lesson { seconds, step, of } = lesson::learn(&room)?;
+            let Lesson { seconds, step, of } = lesson::learn(&room, steps)?;
             let provenance = Provenance::Generated;
             let cell = Cell::new(TRAIN, &timed.column, seconds, provenance, room.queries.map.len());
             let note = format!("H until its best validation, step {step} of {of}, on this machine");

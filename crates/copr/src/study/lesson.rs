@@ -14,10 +14,8 @@ use crate::{
 /// Images of a sequence that are a pair: metres and degrees apart at most, what a grid around an anchor
 /// asks for.
 const NEAR: (f64, f64) = (0.8, 45.0);
-/// Steps, of which the best is usually among the first.
-const STEPS: usize = 650;
-/// Steps between two validations.
-const VALIDATED_EVERY: usize = 130;
+/// Validations of a training.
+const VALIDATIONS: usize = 5;
 
 /// What a training took.
 pub(super) struct Lesson {
@@ -29,22 +27,22 @@ pub(super) struct Lesson {
     pub(super) of: usize,
 }
 
-/// Trains H on the pairs of a room's queries, validated on those of its references, as the thesis does
+/// Trains H for some steps on the pairs of a room's queries, validated on those of its references, as the thesis does
 /// (C-10), and forgets it.
-pub(super) fn learn(room: &Room) -> Result<Lesson> {
+pub(super) fn learn(room: &Room, steps: usize) -> Result<Lesson> {
     let of = |side: &super::Side| {
         Pairs::near(side.map.clone(), &side.sequences, NEAR, Definition::Corrected)
     };
     let (training, validation) = (of(&room.queries)?, of(&room.references)?);
     let folder = tempfile::tempdir().map_err(CoreError::io("a temporary folder"))?;
-    let settings =
-        Training { steps: STEPS, validated_every: VALIDATED_EVERY, ..Training::default() };
+    let validated_every = steps.div_ceil(VALIDATIONS);
+    let settings = Training { steps, validated_every, ..Training::default() };
     let facts = settings.facts(&training, &validation, "timed");
     let log = settings.log(&folder.path().join("log.csv"));
     let work = folder.path().join("work");
     let mut run = Run::open(&work, &facts, log)?;
     let start = Instant::now();
-    let (mut least, mut lesson) = (f64::INFINITY, Lesson { seconds: f64::NAN, step: 0, of: STEPS });
+    let (mut least, mut lesson) = (f64::INFINITY, Lesson { seconds: f64::NAN, step: 0, of: steps });
     let observe = |report: &vpr_nets::train::Report, loss: f64| {
         if loss < least {
             least = loss;

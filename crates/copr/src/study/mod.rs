@@ -101,6 +101,9 @@ pub enum Study {
         places: Vec<Place>,
         /// How descriptors are regressed.
         method: Method,
+        /// Steps of the training of H that is timed; without it none is.
+        #[serde(default)]
+        steps: Option<usize>,
     },
     /// The sparse map under several encoders: figures 6.6 and 6.7.
     Viewpoints {
@@ -265,8 +268,8 @@ pub fn run(experiment: &Experiment<Study>, context: Context<'_>) -> Result<Repor
         Study::Encoders { scenes, step_m, rooms } => {
             encoders::run(out, scenes, *step_m, rooms, context)?;
         }
-        Study::Footprint { scene, step_m, rooms, places, method } => {
-            footprint::run(out, (scene, *step_m, rooms), places, method, context)?;
+        Study::Footprint { scene, step_m, rooms, places, method, steps } => {
+            footprint::run(out, (scene, *step_m, rooms), places, (method, *steps), context)?;
         }
         Study::Viewpoints { scenes, rooms, places } => {
             figure = Some(viewpoints::run(out, scenes, (rooms, places), context)?);

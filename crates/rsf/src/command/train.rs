@@ -113,7 +113,7 @@ mod tests {
     fn committed_weights_are_those_that_experiments_name() {
         let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
         let mut named = BTreeSet::new();
-        for id in ["table-4.3", "table-4.5", "table-4.6"] {
+        for id in ["table-4.3", "table-4.3-heads", "table-4.5", "table-4.6"] {
             let path = workspace.join("experiments").join(id).with_added_extension("toml");
             let experiment = experiment::load::<Study>(&path).unwrap();
             let Study::Recalls { places, encoders, .. } = &experiment.study else { continue };

@@ -106,15 +106,17 @@ fn plots(svg: &str) -> Vec<Bounds> {
     axes.map(of).collect()
 }
 
-/// The colours of the curves in a plot, one for each curve: a line with its marks, or scattered
-/// points.
+/// The colours of the curves in a plot, one for each curve: a line with its marks, scattered points, or
+/// bars, which follow each other.
 fn colours(svg: &str, plot: &Bounds) -> Vec<String> {
     let mut colours: Vec<String> = Vec::new();
     let mut is_line_before = false;
+    let is_bar = |it: &str| it.split(" d=").nth(1).is_some_and(|path| path.contains('V'));
     for curve in drawn(svg, &['l', 'p', 'm', 'x']).iter().filter(|it| it.is_within(plot)) {
         let (kind, colour) = attribute(&curve.what, "class").unwrap().split_once(" c").unwrap();
         let is_marks = is_line_before && matches!(kind, "m" | "x");
-        if !(is_marks && colours.last().is_some_and(|it| it == colour)) {
+        let is_more = is_marks || is_bar(&curve.what);
+        if !(is_more && colours.last().is_some_and(|it| it == colour)) {
             colours.push(colour.to_owned());
         }
         is_line_before = kind == "l";
