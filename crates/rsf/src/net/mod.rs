@@ -1,5 +1,7 @@
 //! Fine-tuning of the default network on a map, and what is cheaper.
 
+#[cfg(feature = "study")]
+mod attention;
 mod finetune;
 mod lessons;
 mod low_rank;
@@ -12,6 +14,8 @@ mod tests;
 mod trial;
 mod whitening;
 
+#[cfg(feature = "study")]
+pub(crate) use attention::looks;
 pub use finetune::{Finetuning, Outcome, finetune, last, run_log};
 pub use lessons::{Lessons, TripletBatch};
 pub use material::{Material, default_network};

@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use burn::tensor::{Tensor, TensorData};
 use vpr_core::Provenance;
 use vpr_data::Dataset;
 use vpr_nets::{
     encode::registry::Method,
-    model::{Tunable as _, default::INPUT, headed::BoqDefault},
+    model::{Tunable as _, headed::BoqDefault},
     weights::Weights,
 };
 use vpr_report::{
@@ -18,7 +17,7 @@ use vpr_study::{ContactSheet, Frame, Sources, Tile};
 use vpr_vision::image::{self, ImageSize, RgbImage, from_pixels, resize_bilinear};
 
 use super::{Encoder, Place, gallery::kept, recalls};
-use crate::Result;
+use crate::{Result, net::looks};
 
 /// Queries of a place that are shown.
 const SHOWN: usize = 3;
@@ -131,19 +130,6 @@ fn chosen(dataset: &Dataset, before: &[usize], after: &[usize]) -> Vec<usize> {
 /// The first correct reference of a query.
 fn correct(dataset: &Dataset, query: usize) -> Option<usize> {
     (0..dataset.references.len()).find(|&it| dataset.truth.is_correct(query, it))
-}
-
-/// Attention of every learned query of the last block over the positions of the map, and the map's
-/// rows and columns.
-fn looks(network: &BoqDefault, image: &RgbImage) -> Result<(Vec<Vec<f32>>, [usize; 2])> {
-    let (input, _) = Method::find("default", None)?.preprocessing().apply(image)?;
-    let input = TensorData::new(input, [1, 3, INPUT.1, INPUT.0]);
-    let map = network.located_map(Tensor::from_data(input, &vpr_nets::device()));
-    let [_, _, rows, columns] = map.dims();
-    let (_, blocks) = network.head().forward_with_attention(map);
-    let last = blocks.into_iter().next_back();
-    let values: Vec<f32> = last.map_or_else(Vec::new, |it| it.into_data().iter().collect());
-    Ok((values.chunks(rows * columns).map(<[f32]>::to_vec).collect(), [rows, columns]))
 }
 
 /// Half the sum of absolute differences: 0 for the same attention, 1 for attention elsewhere.
