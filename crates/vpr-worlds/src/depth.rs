@@ -37,8 +37,8 @@ pub fn depths(recipe: &Recipe, side: Side, images: &[usize]) -> Result<Vec<Depth
     let one = |&index: &usize| {
         let len = shots.len();
         let shot = shots.get(index).ok_or(Error::OutOfRange { what: "image", index, len })?;
-        let size = (shot.camera.height as usize, shot.camera.width as usize);
-        let metres = Array2::from_shape_vec(size, take(&plan, shot).1.depth)
+        let shape = (shot.camera.height as usize, shot.camera.width as usize);
+        let metres = Array2::from_shape_vec(shape, take(&plan, shot).1.depth)
             .map_err(|_| Error::Empty("pixels of a depth image"))?;
         Ok(Depth { camera: shot.camera, pose: shot.pose, metres })
     };

@@ -220,14 +220,14 @@ impl Window {
             return;
         }
         for (row, lines) in lines.iter_mut().enumerate() {
-            let mut line = [0.0; REACH];
+            let mut values = [0.0; REACH];
             if self.rows.contains(&row) {
                 let source = &plane[self.start + (row - self.rows.start) * width..];
-                for (value, &source) in line[self.columns.clone()].iter_mut().zip(source) {
+                for (value, &source) in values[self.columns.clone()].iter_mut().zip(source) {
                     *value = source;
                 }
             }
-            for (lanes, value) in lines.iter_mut().zip(line) {
+            for (lanes, value) in lines.iter_mut().zip(values) {
                 lanes[lane] = value;
             }
         }
