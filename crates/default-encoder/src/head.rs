@@ -48,7 +48,7 @@ pub(crate) struct Args {
     /// Folder that keeps rendered worlds
     #[arg(long, env = "VPR_CACHE", value_name = "DIR", default_value = "data/worlds")]
     cache: PathBuf,
-    /// Folder of checkpoints [default: target/<name of the output>]
+    /// Folder of checkpoints [default: target/, then the name of the output]
     #[arg(long, value_name = "DIR")]
     checkpoints: Option<PathBuf>,
     /// Decides cities, weights and batches
