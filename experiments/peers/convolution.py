@@ -2,8 +2,9 @@
 
 Two threads each. Before each round of either side there is a pause, in which the other side's waiting
 threads go to sleep (OpenMP's spin for some milliseconds and would take one of two cores from ours);
-a round is the median of some calls in a row. PyTorch runs with the malloc settings that keep it from returning its buffers to
-the system at each call; without them it looks two to three times slower on convolutions.
+a round is the median of some calls in a row. PyTorch runs with the malloc settings that keep it from
+returning its buffers to the system at each call (`--as-installed`: without them, up to three times slower
+on convolutions); ours with the allocator of the programs, and without settings.
 """
 
 import argparse
@@ -19,7 +20,8 @@ MALLOC = {
     "MALLOC_TRIM_THRESHOLD_": "17179869184",
     "MALLOC_TOP_PAD_": "67108864",
 }
-if any(os.environ.get(name) != value for name, value in MALLOC.items()):
+AS_INSTALLED = "--as-installed"
+if AS_INSTALLED not in sys.argv and any(os.environ.get(it) != MALLOC[it] for it in MALLOC):
     os.execve(sys.executable, [sys.executable, *sys.argv], {**os.environ, **MALLOC})
 
 import torch
@@ -122,19 +124,21 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("--binary", type=Path, help="the built example, if it is not to be built")
     parser.add_argument("--only", help="cases that start with this")
+    parser.add_argument(AS_INSTALLED, action="store_true", help="PyTorch without malloc settings")
     args = parser.parse_args()
     torch.set_num_threads(2)
     cases = {"layer " + " ".join(map(str, it)): layer(*it) for it in LAYERS}
     cases |= {"resnet34 1": resnet34(1), "resnet34 8": resnet34(8), "train 16": training_step(16)}
     cases["finetune 16"] = finetuning_step(16)
     cases = {name: it for name, it in cases.items() if name.startswith(args.only or "")}
+    settings = {name: value for name, value in os.environ.items() if name not in MALLOC}
     ours = subprocess.Popen(
         [args.binary or build()],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
         bufsize=1,
-        env={**os.environ, "RAYON_NUM_THREADS": "2"},
+        env={**settings, "RAYON_NUM_THREADS": "2"},
     )
     print(f"PyTorch {torch.__version__}, 2 threads, {args.rounds} rounds, medians (minima) in ms")
     missed = False

@@ -7,6 +7,10 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use vpr_report::cli;
 
+/// Large tensors come and go; the system's allocator would give their pages back each time.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// VPR-Bench, chapter 3: techniques, datasets, metrics, invariance and cost of place recognition.
 #[derive(Parser)]
 #[command(name = "bench", version, about, propagate_version = true)]

@@ -7,6 +7,10 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use vpr_report::cli;
 
+/// Large tensors come and go; the system's allocator would give their pages back each time.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// CoPR, chapter 6: descriptors regressed at poses no camera visited.
 #[derive(Parser)]
 #[command(name = "copr", version, about, propagate_version = true)]

@@ -7,6 +7,10 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use vpr_report::cli;
 
+/// Large tensors come and go; the system's allocator would give their pages back each time.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// RSF, chapter 4: fine-tuning on the references of a map, before any query is seen.
 #[derive(Parser)]
 #[command(name = "rsf", version, about, propagate_version = true)]

@@ -7,6 +7,10 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use vpr_report::cli;
 
+/// Large tensors come and go; the system's allocator would give their pages back each time.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// SUE, chapter 5: uncertainty of the best match in visual place recognition.
 #[derive(Parser)]
 #[command(name = "sue", version, about, propagate_version = true)]

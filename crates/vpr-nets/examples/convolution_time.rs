@@ -22,6 +22,10 @@ use vpr_nets::{
     train::Optimizer,
 };
 
+/// As in the programs.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 type Case = Box<dyn FnMut()>;
 
 fn main() -> Result<(), String> {

@@ -4,6 +4,8 @@
 //! gradient, spread by the stride, with the kernel turned by 180 degrees and its channels
 //! exchanged. That of the weights is a product of the output's gradient and the lowered input.
 
+use std::borrow::Cow;
+
 use burn::{
     backend::{
         Autodiff, Backend, Flex,
@@ -88,7 +90,10 @@ fn spread(
     [height, width]: [usize; 2],
     stride: [usize; 2],
     more: [usize; 2],
-) -> (Vec<f32>, [usize; 2]) {
+) -> (Cow<'_, [f32]>, [usize; 2]) {
+    if stride == [1, 1] && more == [0, 0] {
+        return (values.into(), [height, width]);
+    }
     let size = [(height - 1) * stride[0] + 1 + more[0], (width - 1) * stride[1] + 1 + more[1]];
     let n_planes = values.len() / (height * width);
     let mut spread = vec![0.0; n_planes * size[0] * size[1]];
@@ -99,7 +104,7 @@ fn spread(
             to.iter_mut().step_by(stride[1]).zip(from).for_each(|(to, &from)| *to = from);
         }
     });
-    (spread, size)
+    (spread.into(), size)
 }
 
 impl Convolve for Flex {

@@ -5,7 +5,6 @@
 mod attention;
 mod direct;
 mod finish;
-mod frequencies;
 mod geometry;
 mod lower;
 mod multiply;
@@ -18,7 +17,6 @@ use std::sync::OnceLock;
 pub(crate) use attention::{Heads, attend};
 pub use finish::Activation;
 pub(crate) use finish::Finish;
-use frequencies::Frequencies;
 pub(crate) use geometry::Geometry;
 use multiply::Packed;
 pub(crate) use product::{product, product_by_columns, product_by_rows};
@@ -28,7 +26,7 @@ pub(crate) use weights_gradient::weights_gradient;
 #[derive(Debug, Default)]
 pub(crate) struct Weights {
     direct: OnceLock<Packed>,
-    winograd: OnceLock<Frequencies>,
+    winograd: OnceLock<winograd::Frequencies>,
 }
 
 impl Weights {
@@ -46,7 +44,7 @@ impl Weights {
     ) -> Vec<f32> {
         let n_out = geometry.n_out;
         if winograd::suits(geometry, output) {
-            let new = || Frequencies::new(weights, n_out, geometry.input[1]);
+            let new = || winograd::Frequencies::new(weights, n_out, geometry.input[1]);
             winograd::convolve(input, self.winograd.get_or_init(new), geometry, output, finish)
         } else {
             let new = || Packed::new(weights, geometry.depth());
@@ -90,7 +88,7 @@ mod tests {
         values
     }
 
-    fn noise(n: usize, seed: u32) -> Vec<f32> {
+    pub(super) fn noise(n: usize, seed: u32) -> Vec<f32> {
         let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(12345);
         let mut next = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -35,16 +35,25 @@ pub(super) struct Packed {
 
 impl Packed {
     /// Packs a matrix given row by row, `depth` values each.
+    pub(super) fn new(matrix: &[f32], depth: usize) -> Self {
+        Self::of_images(matrix, matrix.len() / depth.max(1), depth)
+    }
+
+    /// Packs `[images, n_rows, n_pixels]` as rows that go on from image to image.
     ///
     /// A square of 16 × 16 values at a time: every line of the cache is read once and whole, also
     /// where the rows lie a power of two apart.
-    pub(super) fn new(matrix: &[f32], depth: usize) -> Self {
-        let n_rows = matrix.len() / depth.max(1);
+    pub(super) fn of_images(images: &[f32], n_rows: usize, n_pixels: usize) -> Self {
+        let n_images = images.len() / (n_rows * n_pixels).max(1);
+        let depth = n_images * n_pixels;
         let mut values = vec![[0.0; TILE]; n_rows.div_ceil(TILE) * depth];
-        let groups = matrix.par_chunks(TILE * depth.max(1));
-        values.par_chunks_exact_mut(depth.max(1)).zip(groups).for_each(|(values, rows)| {
+        values.par_chunks_exact_mut(n_pixels.max(1)).enumerate().for_each(|(index, values)| {
+            let (group, image) = (index / n_images, index % n_images);
+            let first = group * TILE;
+            let rows = &images[(image * n_rows + first) * n_pixels..];
+            let rows = &rows[..TILE.min(n_rows - first) * n_pixels];
             for (block, lanes) in values.chunks_mut(TILE).enumerate() {
-                for (row, values) in rows.chunks_exact(depth).enumerate() {
+                for (row, values) in rows.chunks_exact(n_pixels).enumerate() {
                     let values = &values[block * TILE..][..lanes.len()];
                     for (lanes, &value) in lanes.iter_mut().zip(values) {
                         lanes[row] = value;

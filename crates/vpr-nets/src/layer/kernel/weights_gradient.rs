@@ -11,6 +11,7 @@ use super::{
     geometry::Geometry,
     lower::Planes,
     multiply::{DEPTH_BLOCK, Packed, TILE, Tile, dispatch, multiply},
+    winograd,
 };
 
 /// Panels of 16 weights that share one pass over the output's gradient.
@@ -24,20 +25,26 @@ pub(crate) fn weights_gradient(
     geometry: &Geometry,
     output: [usize; 2],
 ) -> Vec<f32> {
+    if winograd::gradient::suits(geometry, output) {
+        return winograd::gradient::weights_gradient(input, gradient, geometry, output);
+    }
     let [_, n_channels, height, width] = geometry.input;
     let (n_out, depth, n_pixels) = (geometry.n_out, geometry.depth(), output[0] * output[1]);
-    let images: Vec<(Planes<'_>, Packed)> = input
-        .par_chunks_exact(n_channels * height * width)
-        .zip(gradient.par_chunks_exact(n_out * n_pixels))
-        .map(|(image, gradient)| {
-            (Planes::new(image, geometry, output), Packed::new(gradient, n_pixels))
-        })
-        .collect();
+    let images = input.par_chunks_exact(n_channels * height * width);
+    let images: Vec<_> = images.map(|image| Planes::new(image, geometry, output)).collect();
+    let gradient = &Packed::of_images(gradient, n_out, n_pixels);
     let n_panels = depth.div_ceil(TILE);
     let blocks: Vec<usize> = (0..n_panels).step_by(PANELS).collect();
     let sums = blocks.into_par_iter().map(|first| {
         let n = PANELS.min(n_panels - first);
-        dispatch(Block { images: &images, first, n, n_groups: n_out.div_ceil(TILE), n_pixels })
+        dispatch(Block {
+            images: &images,
+            gradient,
+            first,
+            n,
+            n_groups: n_out.div_ceil(TILE),
+            n_pixels,
+        })
     });
     let sums: Vec<Vec<Tile>> = sums.collect();
     let mut values = vec![0.0; n_out * depth];
@@ -54,7 +61,8 @@ pub(crate) fn weights_gradient(
 
 /// Some panels of weights, over all images.
 struct Block<'a> {
-    images: &'a [(Planes<'a>, Packed)],
+    images: &'a [Planes<'a>],
+    gradient: &'a Packed,
     first: usize,
     n: usize,
     n_groups: usize,
@@ -69,17 +77,24 @@ impl WithSimd for Block<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Vec<Tile> {
         let mut sums = vec![[[0.0; TILE]; TILE]; self.n_groups * self.n];
         let mut panels = vec![[0.0; TILE]; self.n * DEPTH_BLOCK];
-        for (planes, gradient) in self.images {
-            for start in (0..self.n_pixels).step_by(DEPTH_BLOCK) {
-                let pixels = start..(start + DEPTH_BLOCK).min(self.n_pixels);
-                for (index, panel) in panels.chunks_exact_mut(DEPTH_BLOCK).enumerate() {
-                    planes.lower_weights((self.first + index) * TILE, pixels.clone(), panel);
+        let last = self.images.len() * self.n_pixels;
+        for start in (0..last).step_by(DEPTH_BLOCK) {
+            let depths = start..(start + DEPTH_BLOCK).min(last);
+            for (index, panel) in panels.chunks_exact_mut(DEPTH_BLOCK).enumerate() {
+                // Small images share a block.
+                let mut depth = start;
+                while depth < depths.end {
+                    let (image, pixel) = (depth / self.n_pixels, depth % self.n_pixels);
+                    let pixels = pixel..self.n_pixels.min(pixel + depths.end - depth);
+                    let panel = &mut panel[depth - start..][..pixels.len()];
+                    depth += pixels.len();
+                    self.images[image].lower_weights((self.first + index) * TILE, pixels, panel);
                 }
-                for (group, sums) in sums.chunks_exact_mut(self.n).enumerate() {
-                    let rows = gradient.group(group, pixels.clone());
-                    for (panel, sums) in panels.chunks_exact(DEPTH_BLOCK).zip(sums) {
-                        multiply(simd, rows, &panel[..rows.len()], sums, false);
-                    }
+            }
+            for (group, sums) in sums.chunks_exact_mut(self.n).enumerate() {
+                let rows = self.gradient.group(group, depths.clone());
+                for (panel, sums) in panels.chunks_exact(DEPTH_BLOCK).zip(sums) {
+                    multiply(simd, rows, &panel[..rows.len()], sums, false);
                 }
             }
         }

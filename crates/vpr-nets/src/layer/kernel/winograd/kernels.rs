@@ -9,7 +9,7 @@ use std::ops::Range;
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 
-use super::multiply::{Lanes, TILE, dispatch};
+use super::super::multiply::{Lanes, TILE, dispatch};
 
 /// Inputs of one tile, per axis.
 pub(super) const REACH: usize = 6;
@@ -18,7 +18,7 @@ pub(super) const N_FREQUENCIES: usize = REACH * REACH;
 
 /// Kernels as frequencies: for every 16 output channels a matrix per frequency, a row per channel.
 #[derive(Clone, Debug)]
-pub(super) struct Frequencies {
+pub(in super::super) struct Frequencies {
     /// `[frequency][channel]` of every group of output channels; rows that fill the last are zero.
     groups: Vec<Vec<Lanes>>,
     n_channels: usize,
@@ -26,7 +26,7 @@ pub(super) struct Frequencies {
 
 impl Frequencies {
     /// Transforms `[n_out, channels, 3, 3]`, in f64.
-    pub(super) fn new(weights: &[f32], n_out: usize, n_channels: usize) -> Self {
+    pub(in super::super) fn new(weights: &[f32], n_out: usize, n_channels: usize) -> Self {
         let kernels = weights.as_chunks::<9>().0;
         let groups = kernels.par_chunks(TILE * n_channels.max(1)).take(n_out.div_ceil(TILE));
         let groups = groups.map(|kernels| dispatch(Kernels { kernels, n_channels })).collect();
