@@ -1,4 +1,4 @@
-//! Fine-tuning of the heads on the default network's trunk, by the names of their methods.
+//! Fine-tuning of networks by the names of their methods.
 
 #![expect(clippy::unwrap_used, reason = "a test fails by panicking")]
 
@@ -67,10 +67,72 @@ impl Task for Steps<'_> {
 }
 
 fn steps(method: &str, settings: &Finetuning, folder: &Path, last: usize) -> Result<usize> {
+    steps_from(&committed(method), method, settings, folder, last)
+}
+
+fn steps_from(
+    weights: &Path,
+    method: &str,
+    settings: &Finetuning,
+    folder: &Path,
+    last: usize,
+) -> Result<usize> {
     fs::create_dir_all(folder).unwrap();
     let set = map(folder.parent().unwrap());
     let task = Steps { settings, set: &set, folder, last };
-    tune(method, Some(&committed(method)), &[], &device(), task)?
+    tune(method, Some(weights), &[], &device(), task)?
+}
+
+/// `CosPlace` on the first two stages of a `ResNet`, a block each, under the official names: uniform
+/// numbers of a fixed sequence, of variance 2 over a layer's inputs.
+fn cosplace(path: &Path) {
+    let mut shapes = vec![
+        ("backbone.0.weight".to_owned(), vec![64, 3, 7, 7]),
+        ("aggregation.1.p".to_owned(), vec![1]),
+        ("aggregation.3.weight".to_owned(), vec![32, 128]),
+        ("aggregation.3.bias".to_owned(), vec![32]),
+    ];
+    let mut norms = vec![("backbone.1".to_owned(), 64)];
+    for (stage, before, channels) in [(4, 64, 64), (5, 64, 128)] {
+        let block = format!("backbone.{stage}.0");
+        let mut layers = vec![("conv1", "bn1", before, 3), ("conv2", "bn2", channels, 3)];
+        if before != channels {
+            layers.push(("downsample.0", "downsample.1", before, 1));
+        }
+        for (convolution, norm, inputs, side) in layers {
+            let shape = vec![channels, inputs, side, side];
+            shapes.push((format!("{block}.{convolution}.weight"), shape));
+            norms.push((format!("{block}.{norm}"), channels));
+        }
+    }
+    for (norm, channels) in norms {
+        for part in ["weight", "bias", "running_mean", "running_var"] {
+            shapes.push((format!("{norm}.{part}"), vec![channels]));
+        }
+    }
+    let (mut header, mut data, mut state) = (Vec::new(), Vec::new(), 1_u32);
+    for (name, shape) in &shapes {
+        let (begin, n) = (data.len(), shape.iter().product::<usize>());
+        let inputs = shape.iter().skip(1).product::<usize>();
+        let scale = (6.0 / inputs as f32).sqrt();
+        for _ in 0..n {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let value = match (shape.len(), name.rsplit('.').next().unwrap()) {
+                (1, "p") => 3.0,
+                (1, "weight" | "running_var") => 1.0,
+                (1, _) => 0.0,
+                _ => scale * ((state >> 8) as f32 / 8_388_608.0 - 1.0),
+            };
+            data.extend_from_slice(&value.to_le_bytes());
+        }
+        let end = data.len();
+        header.push(format!(
+            "\"{name}\":{{\"dtype\":\"F32\",\"shape\":{shape:?},\"data_offsets\":[{begin},{end}]}}"
+        ));
+    }
+    let header = format!("{{{}}}", header.join(","));
+    let length = (header.len() as u64).to_le_bytes();
+    fs::write(path, [&length[..], header.as_bytes(), &data].concat()).unwrap();
 }
 
 fn settings() -> Finetuning {
@@ -119,6 +181,39 @@ fn a_killed_run_goes_on_to_the_same_bits_and_a_rate_of_zero_moves_nothing() {
         assert_eq!(steps(method, &still, &work("still"), usize::MAX).unwrap(), 0);
         assert_eq!(tensors(&work("still").join("tuned.safetensors")), tensors(&committed(method)));
     }
+}
+
+/// From the official names through two runs, one of them killed, to a file that describes and can be
+/// tuned again.
+#[test]
+fn a_resnet_learns_from_end_to_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let (method, start) = ("cosplace-resnet18", folder.path().join("start.safetensors"));
+    cosplace(&start);
+    let settings = Finetuning { batch: 1, rate: 1e-4, ..settings() };
+    let work = |name: &str| folder.path().join(name);
+    let tuned = |name: &str| work(name).join("tuned.safetensors");
+    let run = |name: &str, last| steps_from(&start, method, &settings, &work(name), last);
+    assert!(run("killed", 5).is_err());
+    assert_eq!(run("killed", usize::MAX).unwrap(), run("whole", usize::MAX).unwrap());
+    assert!(fs::read(tuned("killed")).unwrap() == fs::read(tuned("whole")).unwrap());
+    let log = fs::read_to_string(work("whole").join("log.csv")).unwrap();
+    assert_eq!(log, fs::read_to_string(work("killed").join("log.csv")).unwrap());
+    let gaps: Vec<&str> = log.lines().skip(1).filter_map(|line| line.rsplit(',').next()).collect();
+    assert!(gaps.len() == 2 && gaps[0] != gaps[1], "nothing moved: {log}");
+    let weights = tensors(&tuned("whole"));
+    assert_eq!(weights.len(), tensors(&start).len());
+    assert!(
+        weights.iter().all(|it| it.0.starts_with("backbone.") || it.0.starts_with("aggregator."))
+    );
+    let set = map(folder.path());
+    let network = by_name(method, Some(&tuned("whole")), &[]).unwrap();
+    let options = Options::default();
+    let rows = encode_files(network.as_ref(), &set.images()[..2], &options, &mut |_| {}).unwrap();
+    assert_eq!((rows.len(), rows.dim()), (2, 32));
+    let still = Finetuning { rate: 0.0, steps: 5, ..settings };
+    steps_from(&tuned("whole"), method, &still, &work("still"), usize::MAX).unwrap();
+    assert!(tensors(&tuned("still")) == weights);
 }
 
 #[test]

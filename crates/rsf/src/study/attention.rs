@@ -16,7 +16,11 @@ use vpr_report::{
 use vpr_study::{ContactSheet, Frame, Sources, Tile};
 use vpr_vision::image::{self, ImageSize, RgbImage, from_pixels, resize_bilinear};
 
-use super::{Encoder, Place, gallery::kept, recalls};
+use super::{
+    Encoder, Place,
+    gallery::{drawn, kept},
+    recalls,
+};
 use crate::{Result, net::looks};
 
 /// Queries of a place that are shown.
@@ -36,22 +40,16 @@ pub(super) fn attention(
 ) -> Result<Option<Sheet>> {
     let mut sheet = ContactSheet::default();
     for place in places {
-        let dataset = match place.open(sources)? {
-            Ok(dataset) => dataset,
-            Err(why) => {
-                table.push(Cell::absent(&place.name, "change of attention", &why));
-                continue;
-            }
+        let Some(dataset) = place.at_hand(&["change of attention"], table, sources)? else {
+            continue;
         };
-        let before = encoder.unadapted();
-        let networks = [boq(place, &before, sources)?, boq(place, encoder, sources)?];
-        let [Some(old), Some(new)] = networks else {
+        let networks = [boq(place, &encoder.unadapted(), sources)?, boq(place, encoder, sources)?];
+        let found = recalls::before_and_after(place, encoder, &dataset, sources)?;
+        let ([Some(old), Some(new)], Ok([first, second])) = (networks, found) else {
             let why = "weights are not at hand";
             table.push(Cell::absent(&place.name, "change of attention", why));
             continue;
         };
-        let found = [&before, encoder].map(|it| recalls::best(place, it, &dataset, sources));
-        let [Ok(Ok(first)), Ok(Ok(second))] = found else { continue };
         let queries = chosen(&dataset, &first, &second);
         let (mut moved, mut spread, mut n) = (0.0, [0.0; 2], 0_usize);
         for &query in &queries {
@@ -94,7 +92,7 @@ pub(super) fn attention(
         cell("positions before", share(spread[0]));
         cell("positions after", share(spread[1]));
     }
-    if sheet.is_empty() { Ok(None) } else { Ok(Some(sheet.draw(LEGEND)?)) }
+    drawn(&sheet, LEGEND)
 }
 
 /// The network of a row; `None` if its weights are not at hand.

@@ -13,6 +13,8 @@ use crate::Result;
 
 /// Images of a place, at most.
 const SHOWN: usize = 120;
+/// Columns: means along both directions.
+const AXES: [&str; 2] = ["first axis", "second axis"];
 /// What the training domain is called.
 const DOMAIN: &str = "training domain";
 
@@ -36,17 +38,9 @@ pub(super) fn run(
     };
     let mut all = vec![(DOMAIN, domain.provenance, describe(&domain.references, DOMAIN)?)];
     for place in places {
-        match place.open(sources)? {
-            Ok(dataset) => {
-                let rows = describe(&dataset.references, &dataset.name)?;
-                all.push((&place.name, dataset.provenance, rows));
-            }
-            Err(why) => {
-                for column in ["first axis", "second axis"] {
-                    table.push(Cell::absent(&place.name, column, &why));
-                }
-            }
-        }
+        let Some(dataset) = place.at_hand(&AXES, table, sources)? else { continue };
+        let rows = describe(&dataset.references, &dataset.name)?;
+        all.push((&place.name, dataset.provenance, rows));
     }
     let plane = plane(&all.iter().map(|it| &it.2).collect::<Vec<_>>());
     let mut panel = Panel {
@@ -66,8 +60,8 @@ pub(super) fn run(
             .collect();
         let n = points.len();
         let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n as f64;
-        table.push(Cell::new(*name, "first axis", mean(|it| it.0), *origin, n));
-        table.push(Cell::new(*name, "second axis", mean(|it| it.1), *origin, n));
+        table.push(Cell::new(*name, AXES[0], mean(|it| it.0), *origin, n));
+        table.push(Cell::new(*name, AXES[1], mean(|it| it.1), *origin, n));
         panel.curves.push(Curve::new(*name, points).of(*origin).shaped(Shape::Points));
     }
     Ok(Some(Figure { panels: vec![panel] }))

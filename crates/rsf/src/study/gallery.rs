@@ -31,13 +31,7 @@ pub(super) fn augmentations(
 ) -> Result<Option<Sheet>> {
     let mut sheet = ContactSheet::default();
     for place in places {
-        let dataset = match place.open(sources)? {
-            Ok(dataset) => dataset,
-            Err(why) => {
-                table.push(Cell::absent(&place.name, "change", &why));
-                continue;
-            }
-        };
+        let Some(dataset) = place.at_hand(&["change"], table, sources)? else { continue };
         let index = dataset.references.len() / 2;
         let reference = image::decode(&dataset.references[index])?;
         let mut tiles = vec![Tile {
@@ -64,7 +58,7 @@ pub(super) fn augmentations(
         sheet.add_row(place.name.clone(), first.to_vec());
         sheet.add_row("", second.to_vec());
     }
-    if sheet.is_empty() { Ok(None) } else { Ok(Some(sheet.draw(AUGMENTED)?)) }
+    drawn(&sheet, AUGMENTED)
 }
 
 /// Queries that only one of two encoders matches: the first of each kind in the order of the map.
@@ -76,16 +70,14 @@ pub(super) fn found(
 ) -> Result<Option<Sheet>> {
     let mut sheet = ContactSheet::default();
     for place in places {
-        let dataset = match place.open(sources)? {
-            Ok(dataset) => dataset,
+        let Some(dataset) = place.at_hand(&["gained"], table, sources)? else { continue };
+        let [before, after] = match recalls::before_and_after(place, encoder, &dataset, sources)? {
+            Ok(found) => found,
             Err(why) => {
                 table.push(Cell::absent(&place.name, "gained", &why));
                 continue;
             }
         };
-        let before = recalls::best(place, &encoder.unadapted(), &dataset, sources)?;
-        let after = recalls::best(place, encoder, &dataset, sources)?;
-        let (Ok(before), Ok(after)) = (before, after) else { continue };
         let is_right = |best: &[usize], query: usize| dataset.truth.is_correct(query, best[query]);
         for (column, from, to) in [("gained", false, true), ("lost", true, false)] {
             let queries: Vec<usize> = (0..dataset.queries.len())
@@ -105,7 +97,7 @@ pub(super) fn found(
             sheet.add_row(format!("{}: {column}", place.name), tiles.collect());
         }
     }
-    if sheet.is_empty() { Ok(None) } else { Ok(Some(sheet.draw(FOUND)?)) }
+    drawn(&sheet, FOUND)
 }
 
 fn row(dataset: &Dataset, query: usize, found: [(&str, usize); 2]) -> Vec<Tile> {
@@ -122,6 +114,11 @@ fn change(a: &RgbImage, b: &RgbImage) -> f64 {
     let pairs = a.as_slice().iter().zip(b.as_slice());
     let sum: f64 = pairs.map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
     sum / a.as_slice().len().max(1) as f64
+}
+
+/// The sheet with its legend, if anything is on it.
+pub(super) fn drawn(sheet: &ContactSheet, legend: &'static str) -> Result<Option<Sheet>> {
+    Ok(if sheet.is_empty() { None } else { Some(sheet.draw(legend)?) })
 }
 
 /// The image as a file of the cache, named by what it shows.

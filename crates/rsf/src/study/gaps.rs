@@ -54,15 +54,7 @@ pub(super) fn run(
     let domain = describe(&domain.references, "training domain")?;
     for place in places {
         let columns = ["Queries", "Refs.", "Fréchet distance", "own neighbours"];
-        let dataset = match place.open(sources)? {
-            Ok(dataset) => dataset,
-            Err(why) => {
-                for column in columns {
-                    table.push(Cell::absent(&place.name, column, &why));
-                }
-                continue;
-            }
-        };
+        let Some(dataset) = place.at_hand(&columns, table, sources)? else { continue };
         let rows = describe(&dataset.references, &dataset.name)?;
         let gap = gap(&rows, &domain)?;
         let mut push = |column: &str, value: f64, n: usize| {

@@ -10,6 +10,7 @@ use std::{
 use serde::Deserialize;
 use vpr_core::{Error as CoreError, GroundTruth, Provenance};
 use vpr_data::{Dataset, layout::numbered::images_in_order};
+use vpr_report::table::{Cell, Table};
 use vpr_study::Sources;
 use vpr_worlds::{Side, World, is_world, named_recipe};
 
@@ -99,6 +100,24 @@ impl Place {
             poses: poses.map(|(a, b)| (a.select(&queries), b.select(&references))),
             provenance: dataset.provenance,
         })))
+    }
+
+    /// The images with their truth, or absent cells of its row in these columns.
+    pub(super) fn at_hand(
+        &self,
+        columns: &[&str],
+        table: &mut Table,
+        sources: &Sources<'_>,
+    ) -> Result<Option<Arc<Dataset>>> {
+        match self.open(sources)? {
+            Ok(dataset) => Ok(Some(dataset)),
+            Err(why) => {
+                for &column in columns {
+                    table.push(Cell::absent(&self.name, column, &why));
+                }
+                Ok(None)
+            }
+        }
     }
 
     /// The references with their poses; `None` if the images are not at hand.

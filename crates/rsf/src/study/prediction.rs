@@ -26,15 +26,7 @@ pub(super) fn run(
 ) -> Result<()> {
     let mut rows: Vec<(bool, [f64; 4])> = Vec::new();
     for place in places {
-        let dataset = match place.open(sources)? {
-            Ok(dataset) => dataset,
-            Err(why) => {
-                for column in COLUMNS {
-                    table.push(Cell::absent(&place.name, column, &why));
-                }
-                continue;
-            }
-        };
+        let Some(dataset) = place.at_hand(&COLUMNS, table, sources)? else { continue };
         let Some(set) = place.references(sources)? else { continue };
         let material = Material::open(&set)?;
         let adapted = recalls::adapted_now(place, encoder, None, sources)?;

@@ -152,7 +152,7 @@ fn hits(
 }
 
 /// The best reference of every query; or why that cannot be said.
-pub(super) fn best(
+fn best(
     place: &Place,
     encoder: &Encoder,
     dataset: &Dataset,
@@ -166,6 +166,18 @@ pub(super) fn best(
     let ranking = scores.ranking()?;
     let first = |query| ranking.indices(query).first().copied().unwrap_or(0);
     Ok(Ok((0..dataset.queries.len()).map(first).collect()))
+}
+
+/// [`best`] of the network before and after an adaptation.
+pub(super) fn before_and_after(
+    place: &Place,
+    encoder: &Encoder,
+    dataset: &Dataset,
+    sources: &Sources<'_>,
+) -> Result<Result<[Vec<usize>; 2], String>> {
+    let before = best(place, &encoder.unadapted(), dataset, sources)?;
+    let after = best(place, encoder, dataset, sources)?;
+    Ok(before.and_then(|before| Ok([before, after?])))
 }
 
 /// The network with the weights or the projection of a row, as a technique.
@@ -233,9 +245,14 @@ pub(super) fn adapted_now(
     }
     let Some(set) = encoder.learned_from(place).references(sources)? else { return Ok(None) };
     let set = if encoder.without_poses { set.without_poses() } else { set };
+    let settings = encoder
+        .finetuning(seed)
+        .map(|it| Finetuning { mining: it.mining.scaled(encoder.learned_from(place).scale), ..it });
     if encoder.method != "default" {
-        let Some(settings) = encoder.finetuning(seed) else { return Ok(None) };
-        return Ok(Some(tuned_now(&encoder.method, &settings, &set, sources)?));
+        return match settings {
+            None => Ok(None),
+            Some(settings) => Ok(Some(tuned_now(&encoder.method, &settings, &set, sources)?)),
+        };
     }
     let material = Material::open(&set)?;
     let start = match &encoder.from {
@@ -246,8 +263,7 @@ pub(super) fn adapted_now(
     if let Some(whitening) = encoder.whitening(seed) {
         return Ok(Some(whitened_now(&whitening, &material, sources)?));
     }
-    let Some(mut settings) = encoder.finetuning(seed) else { return Ok(None) };
-    settings.mining = settings.mining.scaled(encoder.learned_from(place).scale);
+    let Some(settings) = settings else { return Ok(None) };
     let (network, digest) = default_network(start.as_deref())?;
     let facts = settings.facts(&material, &digest);
     let folder = kept("rsf", &facts, sources);
