@@ -14,23 +14,29 @@ built=${CARGO_TARGET_DIR:-target}/debug
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# A command that must end with exit code 2 and one line on stderr.
-refused() {
-  local what=$1 code=0
-  shift
-  "$@" > /dev/null 2> "$work/stderr" || code=$?
-  printf '%s: exit %s: %s\n' "$what" "$code" "$(cat "$work/stderr")"
-  if [ "$code" != 2 ] || [ "$(wc -l < "$work/stderr")" != 1 ]; then
-    echo "must be exit 2 and one line" >&2
-    exit 1
-  fi
-}
+# Without a desktop, libraries of Mesa's complain on stderr.
+export XDG_RUNTIME_DIR=${XDG_RUNTIME_DIR:-$work} VPR_NO_PROGRESS=1
 
-encode=("$built/bench" encode data/fixture/places/ref --method default --out "$work/map.safetensors" --quiet)
-refused "a device that is not there" "${encode[@]}" --device "$kind:99"
-# Software Vulkan takes the memory of the process: what the program itself needs, and little more.
+# Runs a command; its exit code is then in `code`, and whether it was 2 with one line decides.
+refused() {
+  code=0
+  "$@" > /dev/null 2> "$work/stderr" || code=$?
+  [ "$code" = 2 ] && [ "$(wc -l < "$work/stderr")" = 1 ]
+}
+encode=("$built/bench" encode data/fixture/places/ref --method default --out "$work/map.safetensors")
+
+refused "${encode[@]}" --device "$kind:99" || { cat "$work/stderr"; echo "exit $code, not 2 and one line" >&2; exit 1; }
+echo "a device that is not there: $(cat "$work/stderr")"
+
+# Software Vulkan takes the memory of the process. With too little not even the driver starts, with a
+# little more the program runs; between the two the device has none left.
 if [ "$kind" = wgpu ]; then
-  refused "a device without memory" prlimit --as="${VPR_DEVICE_MEMORY:-1500000000}" \
-    "${encode[@]}" --device "$device" --image-size 960 1280 --batch-size 6
+  for megabytes in $(seq 550 50 1200); do
+    if refused prlimit --as="${megabytes}000000" "${encode[@]}" --device "$device"; then
+      echo "a device without memory ($megabytes MB): $(cat "$work/stderr")"
+      break
+    fi
+    [ "$code" != 0 ] || { echo "no limit of memory was refused in one line" >&2; exit 1; }
+  done
 fi
 "$built/examples/devices" "$device"
