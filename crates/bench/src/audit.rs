@@ -1,6 +1,6 @@
 //! What may be wrong with a ground truth, and what follows from how it was drawn.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, fmt};
 
 use vpr_core::{Descriptors, Error, GroundTruth, Poses, Ranking, Result, metrics::recall_at};
 
@@ -111,11 +111,48 @@ pub fn without_positives(truth: &GroundTruth) -> Vec<usize> {
     (0..truth.len()).filter(|&it| truth.is_new_place(it)).collect()
 }
 
-/// What a radius makes of a dataset.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AtRadius {
+/// How far a reference may be from a query and still be correct.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
     /// Metres.
     pub radius: f64,
+    /// Degrees between the orientations of the cameras; any if there is none.
+    pub angle: Option<f64>,
+}
+
+impl fmt::Display for Limits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} m", self.radius)?;
+        self.angle.map_or(Ok(()), |angle| write!(f, " and {angle}°"))
+    }
+}
+
+impl Limits {
+    /// The truth of images with these poses; both limits belong to it.
+    fn truth(self, queries: &Poses, references: &Poses) -> Result<GroundTruth> {
+        let near = GroundTruth::within_radius(queries, references, self.radius)?;
+        let Some(angle) = self.angle else { return Ok(near) };
+        if !(0.0..=180.0).contains(&angle) {
+            let reason = "must be from 0 to 180 degrees";
+            return Err(Error::Parameter { name: "angle", value: angle.to_string(), reason });
+        }
+        let (queries, references) = (queries.six_dof()?, references.six_dof()?);
+        let turned = |query: usize, reference: usize| {
+            queries[query].rotation.angle_to(&references[reference].rotation).to_degrees()
+        };
+        let of = |query: usize| {
+            let near = near.correct(query).iter().copied();
+            near.filter(|&reference| turned(query, reference) <= angle).collect()
+        };
+        GroundTruth::from_lists((0..near.len()).map(of).collect(), near.n_references())
+    }
+}
+
+/// What limits make of a dataset.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AtLimits {
+    /// The limits.
+    pub limits: Limits,
     /// Queries that then have a correct reference.
     pub n_known: usize,
     /// R@1 of every method.
@@ -124,38 +161,39 @@ pub struct AtRadius {
     pub order: Vec<usize>,
 }
 
-/// R@1 of every method at every radius. Where two of them have different
-/// [`AtRadius::order`], the radius decides which method is better.
+/// R@1 of every method under every limit. Where two of them have different
+/// [`AtLimits::order`], the limit decides which method is better.
 ///
 /// # Errors
 ///
-/// Poses of different kinds, a radius that is no distance, and rankings of other queries.
-pub fn radii(
+/// Poses of different kinds, or without orientation where an angle is asked for; a radius that is no
+/// distance, an angle that is none, and rankings of other queries.
+pub fn at_limits(
     rankings: &[&Ranking],
     queries: &Poses,
     references: &Poses,
-    radii: &[f64],
-) -> Result<Vec<AtRadius>> {
-    let at = |&radius: &f64| {
-        let truth = GroundTruth::within_radius(queries, references, radius)?;
+    limits: &[Limits],
+) -> Result<Vec<AtLimits>> {
+    let at = |&limits: &Limits| {
+        let truth = limits.truth(queries, references)?;
         let recall = rankings.iter().map(|it| recall_at(1, *it, &truth));
         let recall = recall.collect::<Result<Vec<f64>>>()?;
         let mut order: Vec<usize> = (0..recall.len()).collect();
         order.sort_by(|&a, &b| recall[b].total_cmp(&recall[a]).then(a.cmp(&b)));
-        Ok(AtRadius { radius, n_known: truth.n_known(), recall, order })
+        Ok(AtLimits { limits, n_known: truth.n_known(), recall, order })
     };
-    radii.iter().map(at).collect()
+    limits.iter().map(at).collect()
 }
 
-/// Pairs of methods of which one is better at one radius and the other at another, with these radii.
+/// Pairs of methods of which one is better under one limit and the other under another, with these.
 #[must_use]
-pub fn reversals(at: &[AtRadius]) -> Vec<(usize, usize, f64, f64)> {
+pub fn reversals(at: &[AtLimits]) -> Vec<(usize, usize, Limits, Limits)> {
     let n = at.first().map_or(0, |it| it.recall.len());
     let pairs = (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b)));
     let reversal = |(a, b): (usize, usize)| {
         let first = at.iter().find(|it| it.recall[a] > it.recall[b])?;
         let second = at.iter().find(|it| it.recall[b] > it.recall[a])?;
-        Some((a, b, first.radius, second.radius))
+        Some((a, b, first.limits, second.limits))
     };
     pairs.filter_map(reversal).collect()
 }
@@ -163,7 +201,7 @@ pub fn reversals(at: &[AtRadius]) -> Vec<(usize, usize, f64, f64)> {
 #[cfg(test)]
 mod tests {
     use ndarray::array;
-    use vpr_core::PlanarPosition;
+    use vpr_core::{PlanarPosition, Pose};
 
     use super::*;
 
@@ -199,16 +237,44 @@ mod tests {
         assert_eq!(without_positives(&truth), [1, 2]);
     }
 
+    fn radius(radius: f64) -> Limits {
+        Limits { radius, angle: None }
+    }
+
     #[test]
     fn a_radius_can_decide_which_method_is_better() {
         let (queries, references) = (planar(&[0.0, 0.0, 0.0]), planar(&[0.5, 8.0, 90.0]));
         let exact = Ranking::new(array![[0], [0], [2]]).unwrap();
         let coarse = Ranking::new(array![[1], [1], [1]]).unwrap();
-        let at = radii(&[&exact, &coarse], &queries, &references, &[0.1, 1.0, 10.0]).unwrap();
+        let limits = [0.1, 1.0, 10.0].map(radius);
+        let at = at_limits(&[&exact, &coarse], &queries, &references, &limits).unwrap();
         assert_eq!(at[0].n_known, 0);
         assert_eq!((at[1].recall[0], at[1].recall[1]), (2.0 / 3.0, 0.0));
         assert_eq!((&at[1].order, &at[2].order), (&vec![0, 1], &vec![1, 0]));
-        assert_eq!(reversals(&at), [(0, 1, 1.0, 10.0)]);
+        assert_eq!(reversals(&at), [(0, 1, radius(1.0), radius(10.0))]);
         assert!(reversals(&at[..2]).is_empty());
+    }
+
+    #[test]
+    fn an_angle_leaves_out_who_looks_elsewhere() {
+        let pose = |x: f64, degrees: f64| {
+            let turn = nalgebra::Vector3::y() * degrees.to_radians();
+            Pose::new(nalgebra::Vector3::new(x, 0.0, 0.0), turn)
+        };
+        let queries = Poses::SixDof(vec![pose(0.0, 0.0), pose(5.0, 0.0)]);
+        let references = Poses::SixDof(vec![pose(0.0, 180.0), pose(1.0, -30.0), pose(5.0, 29.0)]);
+        let nearest = Ranking::new(array![[0], [2]]).unwrap();
+        let alike = Ranking::new(array![[1], [1]]).unwrap();
+        let of = |radius, angle| Limits { radius, angle };
+        let limits = [of(2.0, None), of(2.0, Some(31.0)), of(2.0, Some(29.5))];
+        let at = at_limits(&[&nearest, &alike], &queries, &references, &limits).unwrap();
+        let recall = |index: usize| (at[index].n_known, at[index].recall.clone());
+        assert_eq!(recall(0), (2, vec![1.0, 0.5]));
+        assert_eq!(recall(1), (2, vec![0.5, 0.5]));
+        assert_eq!(recall(2), (1, vec![0.5, 0.0]));
+        assert_eq!(limits[1].to_string(), "2 m and 31°");
+        let flat = planar(&[0.0, 5.0]);
+        assert!(at_limits(&[], &flat, &flat, &limits[1..]).is_err());
+        assert!(at_limits(&[], &queries, &references, &[of(2.0, Some(181.0))]).is_err());
     }
 }

@@ -3,9 +3,9 @@
 //! On the processor layers use the kernels of this crate; elsewhere they are burn's own operations
 //! (features `wgpu` and `cuda`), whose results differ by rounding.
 
-use std::{cell::Cell, fmt, panic, str::FromStr, sync::Once};
+use std::{cell::Cell, fmt, panic, str::FromStr, sync::Once, thread};
 
-use burn::tensor::Device;
+use burn::tensor::{Device, Tensor, TensorData};
 
 use crate::{Error, Result};
 
@@ -107,20 +107,40 @@ pub(crate) fn computed<T>(device: &Device, work: impl FnOnce() -> T) -> Result<T
     if *device == Device::flex() {
         return Ok(work());
     }
-    caught(work).map_err(|reason| Error::Device { device: format!("{device:?}"), reason })
+    caught(work).map_err(|reason| failed(device, reason))
+}
+
+/// The values of what is computed on a device, which says only then that it failed.
+pub(crate) fn read<const D: usize>(
+    device: &Device,
+    work: impl FnOnce() -> Tensor<D>,
+) -> Result<TensorData> {
+    let data = computed(device, || work().try_into_data())?;
+    data.map_err(|err| failed(device, line(&err.to_string())))
+}
+
+fn failed(device: &Device, reason: String) -> Error {
+    Error::Device { device: format!("{device:?}"), reason }
+}
+
+/// What a device said, in one line: the innermost cause, if it told one.
+fn line(text: &str) -> String {
+    let cause = text.rsplit_once("Caused by:").map_or(text, |(_, cause)| cause);
+    let line = cause.lines().map(str::trim).find(|line| !line.is_empty());
+    vpr_files::shorten(line.unwrap_or("failed without a word"))
 }
 
 thread_local! {
     static IS_CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What some work gives, or the first line of what it panicked with, which is not printed then.
+/// What some work gives, or a line of what it panicked with, which is not printed then.
 fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
         let usual = panic::take_hook();
         panic::set_hook(Box::new(move |info| {
-            if !IS_CAUGHT.get() {
+            if !IS_CAUGHT.get() && !is_of_a_device(thread::current().name()) {
                 usual(info);
             }
         }));
@@ -131,9 +151,14 @@ fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     result.map_err(|payload| {
         let text = payload.downcast_ref::<String>().map(String::as_str);
         let text = text.or_else(|| payload.downcast_ref::<&str>().copied());
-        let line = text.and_then(|it| it.lines().find(|line| !line.trim().is_empty()));
-        vpr_files::shorten(line.unwrap_or("failed without a word"))
+        line(text.unwrap_or_default())
     })
+}
+
+/// Whether burn runs the queue of a device on the thread of this name. What it panics with there is
+/// told to whoever asks for the result.
+fn is_of_a_device(thread: Option<&str>) -> bool {
+    thread.is_some_and(|name| name.starts_with("DSU-") || name.starts_with("DSD-"))
 }
 
 #[cfg(test)]
@@ -173,6 +198,8 @@ mod tests {
             caught(|| panic!("out of memory\nat line 3")),
             Err::<(), _>("out of memory".into())
         );
+        let text = "An error happened during execution\nCaused by:\n  out of memory\n  at line 3";
+        assert_eq!(line(text), "out of memory");
         let own = panic::catch_unwind(|| computed(&Device::flex(), || panic!("ours")));
         assert!(own.is_err());
     }

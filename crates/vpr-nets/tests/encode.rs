@@ -11,13 +11,14 @@ use std::{
 use burn::tensor::Tensor;
 use vpr_core::{
     PlanarPosition, Poses,
+    knn::Metric,
     map::{OpenMap, Opening, RowType},
 };
 use vpr_nets::{
     Result,
     encode::{
         Channels, Encoder, Images, Interpolation, Options, Preprocessing, Size, batch_leak,
-        encode_each, encode_files, encode_images, encode_to_map,
+        encode_each, encode_files, encode_images, encode_to_map, registry::Matching,
     },
 };
 use vpr_vision::image::{ImageSize, decode, from_pixels};
@@ -26,13 +27,15 @@ use vpr_vision::image::{ImageSize, decode, from_pixels};
 struct Means {
     preprocessing: Preprocessing,
     leaks: bool,
+    matching: Matching,
     calls: AtomicUsize,
 }
 
 impl Means {
     fn new(size: Size) -> Self {
         let preprocessing = Preprocessing { size, ..Preprocessing::image_net(8, 8) };
-        Self { preprocessing, leaks: false, calls: AtomicUsize::new(0) }
+        let matching = Matching::Euclidean;
+        Self { preprocessing, leaks: false, matching, calls: AtomicUsize::new(0) }
     }
 }
 
@@ -57,6 +60,10 @@ impl Encoder for Means {
 
     fn batch_dependent(&self) -> bool {
         self.leaks
+    }
+
+    fn matching(&self) -> Matching {
+        self.matching
     }
 
     fn weights_digest(&self) -> Option<&'static str> {
@@ -240,6 +247,23 @@ fn a_map_says_how_it_was_made_and_leaves_out_what_cannot_be_read() {
     let difference = map.descriptors().unwrap().into_inner() - rows.into_inner();
     assert!(difference.iter().all(|it| it.abs() < 1e-5));
     assert!(!folder.path().join("map.safetensors.work").exists());
+}
+
+/// `bench map search` asks the map how its descriptors are compared.
+#[test]
+fn a_map_says_how_its_descriptors_are_compared() {
+    let (folder, paths) = folder(2);
+    for (matching, metric) in
+        [(Matching::Euclidean, Metric::Euclidean), (Matching::L1, Metric::Manhattan)]
+    {
+        let target = folder.path().join("map.safetensors");
+        let encoder = Means { matching, ..fixed() };
+        to_map(&encoder, &images(&paths), &target).unwrap();
+        let map = OpenMap::open(&target, Opening::default()).unwrap();
+        assert_eq!(map.about().metric, Some(metric));
+        drop(map);
+        fs::remove_file(&target).unwrap();
+    }
 }
 
 #[test]

@@ -158,13 +158,12 @@ impl Scale<'_> {
     #[expect(clippy::inline_always, reason = "takes the instruction set of the caller")]
     #[inline(always)]
     fn finish(&self, values: &mut [f32; DIM], area: f32) {
-        let sum: f32 = values.iter().sum();
-        if sum / area < self.params.contrast {
+        if sum(values, |it| it) / area < self.params.contrast {
             *values = [0.0; DIM];
             return;
         }
         let scale = |values: &mut [f32; DIM]| {
-            let length = values.iter().map(|it| it * it).sum::<f32>().sqrt().max(f32::MIN_POSITIVE);
+            let length = sum(values, |it| it * it).sqrt().max(f32::MIN_POSITIVE);
             for it in values {
                 *it /= length;
             }
@@ -174,7 +173,7 @@ impl Scale<'_> {
             *it = it.min(CLIP);
         }
         if self.root {
-            let sum: f32 = values.iter().sum();
+            let sum = sum(values, |it| it);
             for it in values.iter_mut() {
                 *it = (*it / sum).sqrt();
             }
@@ -182,6 +181,17 @@ impl Scale<'_> {
             scale(values);
         }
     }
+}
+
+/// The sum over a descriptor, orientation by orientation: no addition waits for the one before.
+#[expect(clippy::inline_always, reason = "takes the instruction set of the caller")]
+#[inline(always)]
+fn sum(values: &[f32; DIM], term: impl Fn(f32) -> f32) -> f32 {
+    let mut sums = [0.0; ORIENTATIONS];
+    for histogram in values.as_chunks::<ORIENTATIONS>().0 {
+        sums.iter_mut().zip(histogram).for_each(|(sum, &value)| *sum += term(value));
+    }
+    sums.iter().sum()
 }
 
 /// What each bin along an axis counts: the mean of the window over it, times its side.

@@ -39,6 +39,10 @@ pub(crate) struct AuditArgs {
     /// Radii at which methods are ranked, in metres
     #[arg(long, num_args = 1.., default_values_t = [1.0, 2.0, 5.0, 10.0, 25.0, 50.0], value_name = "M")]
     radii: Vec<f64>,
+    /// Angles between the orientations of two cameras at which methods are ranked besides, at every
+    /// radius, in degrees; poses must have an orientation
+    #[arg(long, num_args = 1.., value_name = "DEG")]
+    angles: Vec<f64>,
     /// Write every finding, as CSV: what, query, reference, number
     #[arg(long, value_name = "FILE")]
     findings: Option<PathBuf>,
@@ -170,7 +174,7 @@ impl Findings {
         Ok(())
     }
 
-    /// R@1 of all methods at every radius, and which methods change places.
+    /// R@1 of all methods at every radius and angle, and which methods change places.
     fn radii(&mut self, args: &AuditArgs, found: &[(String, Retrieved)]) -> anyhow::Result<()> {
         let first = &found[0].1;
         let poses = (&first.queries.poses, &first.references.poses);
@@ -179,20 +183,28 @@ impl Findings {
             return Ok(());
         };
         let rankings: Vec<_> = found.iter().map(|(_, it)| &it.ranking).collect();
-        let at = audit::radii(&rankings, queries, references, &args.radii)?;
+        let angles = || [None].into_iter().chain(args.angles.iter().copied().map(Some));
+        let limits: Vec<_> = args
+            .radii
+            .iter()
+            .flat_map(|&radius| angles().map(move |angle| audit::Limits { radius, angle }))
+            .collect();
+        let at = audit::at_limits(&rankings, queries, references, &limits)?;
         for it in &at {
             let recall = found.iter().zip(&it.recall);
             let recall: Vec<String> =
                 recall.map(|((name, _), value)| format!("{name} {:.1}", 100.0 * value)).collect();
-            let (radius, known) = (it.radius, it.n_known);
+            let (limits, known) = (it.limits, it.n_known);
             let _ =
-                writeln!(self.text, "within {radius} m: {known} known, R@1: {}", recall.join(", "));
+                writeln!(self.text, "within {limits}: {known} known, R@1: {}", recall.join(", "));
         }
         for (a, b, one, other) in audit::reversals(&at) {
             let (a, b) = (&found[a].0, &found[b].0);
-            let _ =
-                writeln!(self.text, "{a} is better than {b} at {one} m, and worse at {other} m");
-            self.push("reversal", a, b, format!("{one} {other}"));
+            let _ = writeln!(
+                self.text,
+                "{a} is better than {b} within {one}, and worse within {other}"
+            );
+            self.push("reversal", a, b, format!("{one}; {other}"));
         }
         if let Some(source) = args.input.truth.source().filter(|it| matches!(it, Source::File(..)))
         {

@@ -7,7 +7,7 @@ use vpr_core::{
     Definition, GroundTruth, Provenance,
     metrics::{McNemar, effective},
 };
-use vpr_report::table::{Cell, Table, Value};
+use vpr_report::table::{Cell, Table, Value, p_value};
 
 use super::retrieved::Retrieved;
 
@@ -179,11 +179,6 @@ impl Compared<'_> {
     fn row(&self, pair: &Pair) -> String {
         format!("{} − {}, {}", self.names[pair.first], self.names[pair.second], name(pair.metric))
     }
-}
-
-/// No p-value is zero.
-fn p_value(value: f64) -> String {
-    if value < 0.001 { "< 0.001".to_owned() } else { format!("= {value:.3}") }
 }
 
 fn name(metric: Metric) -> String {

@@ -9,7 +9,7 @@ use vpr_core::{
         effective,
     },
 };
-use vpr_report::table::{Cell, Table};
+use vpr_report::table::{Cell, Table, p_value};
 use vpr_study::{Direction, Runner, Subject, Technique};
 
 use super::{Context, best};
@@ -131,11 +131,11 @@ fn push_costs(table: &mut Table, theirs: &Subject, ours: &Subject, seed: u64) ->
             |it| share(&first, it),
             |it| share(&second, it),
         )?;
-        let p_value = Discordant::count(&first, &second)?.p_value(McNemar::MidP);
+        let p = Discordant::count(&first, &second)?.p_value(McNemar::MidP);
         let interval = test.interval;
         let cell = cell(format!("R@{n}"), interval.estimate);
         let cell = cell.within(interval.low, interval.high, "paired bootstrap");
-        table.push(cell.noted(format!("McNemar's test, mid-p: p = {p_value:.2}")));
+        table.push(cell.noted(format!("McNemar's test, mid-p: p {}", p_value(p))));
     }
     let (first, second) = (theirs.evaluation()?, ours.evaluation()?);
     for definition in [Definition::Published, Definition::Corrected] {
@@ -143,7 +143,7 @@ fn push_costs(table: &mut Table, theirs: &Subject, ours: &Subject, seed: u64) ->
         let interval = test.interval;
         let cell = cell("AUC-PR".to_owned(), interval.estimate).defined(definition);
         let cell = cell.within(interval.low, interval.high, "paired bootstrap");
-        table.push(cell.noted(format!("paired bootstrap: p = {:.2}", test.p_value)));
+        table.push(cell.noted(format!("paired bootstrap: p {}", p_value(test.p_value))));
     }
     Ok(())
 }

@@ -254,6 +254,6 @@ const RUN: usize = 64;
 
 /// Whether a score is finite and above the cutoff.
 #[inline]
-fn dropped(score: f32, cutoff: f32) -> bool {
+pub(super) fn dropped(score: f32, cutoff: f32) -> bool {
     score > cutoff && score < f32::INFINITY
 }

@@ -16,7 +16,7 @@ use vpr_core::{Descriptors, Error};
 use vpr_vision::image::{self, ImageSize, RgbImage};
 
 use super::Encoder;
-use crate::{Result, device::computed};
+use crate::{Result, device::read};
 
 /// How images are run through an encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -237,9 +237,9 @@ fn encode_batch(
     })?;
     let shape = [kept.len(), encoder.preprocessing().n_channels(), size.height, size.width];
     let device = encoder.device();
-    let data = computed(&device, || {
+    let data = read(&device, || {
         let tensor = Tensor::<4>::from_data(TensorData::new(values, shape), &device);
-        encoder.forward(tensor).into_data()
+        encoder.forward(tensor)
     })?;
     let values = data
         .try_into_vec::<f32>()

@@ -14,7 +14,7 @@ use vpr_core::{
     map::{About, Coordinates, GrowingMap, ImageSize, Names, OpenMap, Opening, RowType, merge},
 };
 
-use super::{Encoder, Interpolation, Options, Size, encode_each, stamps};
+use super::{Encoder, Interpolation, Options, Size, encode_each, registry::Matching, stamps};
 use crate::Result;
 
 /// The images that a map is made of.
@@ -204,7 +204,10 @@ fn about(encoder: &dyn Encoder, coordinates: Option<Coordinates>) -> About {
         weights_digest: encoder.weights_digest().map(str::to_owned),
         image_size,
         interpolation: Some(format!("{filter}{order}")),
-        metric: Some(Metric::Euclidean),
+        metric: Some(match encoder.matching() {
+            Matching::Euclidean => Metric::Euclidean,
+            Matching::L1 => Metric::Manhattan,
+        }),
         coordinates,
     }
 }

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use vpr_core::metrics::{Discordant, McNemar};
 
 use super::{Judged, Report, escape};
+use crate::table::p_value;
 
 /// Pairs listed.
 const MOST: usize = 15;
@@ -37,7 +38,7 @@ pub(super) fn write(out: &mut dyn Write, report: &Report<'_>, judged: &[Judged])
         let (wins, losses) = (count((true, false)), count((false, true)));
         let p = Discordant { n_queries: first.len(), first: wins, second: losses }
             .p_value(McNemar::Exact);
-        let p = if p < 0.001 { "&lt; 0.001".to_owned() } else { format!("{p:.3}") };
+        let p = escape(p_value(p).trim_start_matches("= "));
         writeln!(
             out,
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{wins}</td><td>{losses}</td><td>{}</td><td>{p}</td></tr>",

@@ -15,6 +15,7 @@ use serde::{Deserialize, Serialize};
 use vpr_core::Provenance;
 
 pub use check::{Checked, Finding, check};
+pub use number::p_value;
 pub use page::{Drawings, csv_page, html_document, html_page, markdown_page, read_csv};
 pub use render::{Format, WIDTH};
 

@@ -26,6 +26,12 @@ pub(super) fn with_interval(value: &Value, interval: Option<&Interval>) -> Strin
     format!("{shown} ({low}{to}{high})")
 }
 
+/// A p-value: `= 0.031`, or `< 0.001`, for none is zero.
+#[must_use]
+pub fn p_value(value: f64) -> String {
+    if value < 0.001 { "< 0.001".to_owned() } else { format!("= {value:.3}") }
+}
+
 /// A number: whole, or four decimals, or two if large; fractions without the zero before the point.
 pub(super) fn number(value: f64) -> String {
     let magnitude = value.abs();

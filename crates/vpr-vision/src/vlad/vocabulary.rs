@@ -4,7 +4,7 @@ use ndarray::{Array1, Array2};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
-use vpr_core::{Descriptors, Error, Result, retrieve};
+use vpr_core::{Descriptors, Error, Result, knn::nearest, retrieve};
 
 /// How a [`Vocabulary`] is fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -95,25 +95,25 @@ impl Vocabulary {
     /// As [`Self::encode`].
     pub fn encode_all(&self, sets: &[Descriptors], intra_normalise: bool) -> Result<Array1<f32>> {
         let (clusters, dim) = (self.centres.len(), self.centres.dim());
-        let mut sums = Array2::<f64>::zeros((clusters, dim));
+        let row_len = dim.max(1);
+        let mut sums = vec![0.0_f64; clusters * dim];
         let mut counts = vec![0_usize; clusters];
         for features in sets.iter().filter(|it| !it.is_empty()) {
-            let assigned = retrieve(features, &self.centres, 1)?.best();
-            for (index, &cluster) in assigned.iter().enumerate() {
+            let assigned = nearest(&self.centres, features)?;
+            for (row, cluster) in features.as_slice().chunks_exact(row_len).zip(assigned) {
                 counts[cluster] += 1;
-                let pairs = sums.row_mut(cluster).into_iter().zip(features.row(index));
-                pairs.for_each(|(sum, x)| *sum += f64::from(*x));
+                let sum = &mut sums[cluster * dim..(cluster + 1) * dim];
+                sum.iter_mut().zip(row).for_each(|(sum, x)| *sum += f64::from(*x));
             }
         }
-        for ((mut row, centre), count) in
-            sums.outer_iter_mut().zip(self.centres.view().outer_iter()).zip(counts)
-        {
+        let centres = self.centres.as_slice().chunks_exact(row_len);
+        for ((row, centre), count) in sums.chunks_exact_mut(row_len).zip(centres).zip(counts) {
             row.iter_mut().zip(centre).for_each(|(sum, c)| *sum -= count as f64 * f64::from(*c));
             if intra_normalise {
-                scale_to_unit(row.iter_mut());
+                scale_to_unit(row);
             }
         }
-        scale_to_unit(sums.iter_mut());
+        scale_to_unit(&mut sums);
         Ok(sums.iter().map(|&x| narrow(x)).collect())
     }
 }
@@ -123,9 +123,8 @@ fn narrow(x: f64) -> f32 {
     x as f32
 }
 
-fn scale_to_unit<'a>(values: impl Iterator<Item = &'a mut f64>) {
-    let values: Vec<_> = values.collect();
-    let norm = values.iter().map(|x| **x * **x).sum::<f64>().sqrt();
+fn scale_to_unit(values: &mut [f64]) {
+    let norm = values.iter().map(|x| x * x).sum::<f64>().sqrt();
     if norm > 0.0 {
         for x in values {
             *x /= norm;
