@@ -120,7 +120,9 @@ pub(crate) fn read<const D: usize>(
 }
 
 fn failed(device: &Device, reason: String) -> Error {
-    Error::Device { device: format!("{device:?}"), reason }
+    let device = format!("{device:?}");
+    let inner = device.strip_prefix("Device<Cube(").and_then(|it| it.strip_suffix(")>"));
+    Error::Device { device: inner.unwrap_or(&device).to_owned(), reason }
 }
 
 /// What a device said, in one line: the innermost cause, if it told one.
