@@ -199,10 +199,9 @@ impl WithSimd for Pair<'_> {
     /// The sums at every frequency, then `Gᵀ m G`, in f64 as the kernels' own frequencies.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "gradients are f32")]
-    #[expect(clippy::needless_range_loop, reason = "counted loops over constants are vectorised")]
     fn with_simd<S: Simd>(self, simd: S) -> Vec<Kernels> {
         let n = self.outputs.len() / N_FREQUENCIES;
-        let mut sums = [[[0.0; TILE]; TILE]; N_FREQUENCIES];
+        let mut sums = vec![[[0.0; TILE]; TILE]; N_FREQUENCIES];
         let slabs = self.outputs.chunks_exact(n).zip(self.inputs.chunks_exact(n));
         for (sums, (outputs, inputs)) in sums.iter_mut().zip(slabs) {
             multiply(simd, outputs, inputs, sums, true);
